@@ -1,0 +1,191 @@
+"""What the stages hand each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pycolmap
+
+Float32Array = NDArray[np.float32]
+Float64Array = NDArray[np.float64]
+Uint8Array = NDArray[np.uint8]
+Uint32Array = NDArray[np.uint32]
+
+
+class SkipReason(Enum):
+    """Why a file given as a photo is not used."""
+
+    NOT_AN_IMAGE = "not an image"
+    EMPTY_FILE = "empty file"
+    TRUNCATED = "truncated"
+    UNREADABLE = "unreadable"
+    TOO_SMALL = "too small"
+    NO_FEATURES = "no features"
+    DUPLICATE = "duplicate"
+
+
+@dataclass(frozen=True, slots=True)
+class Skipped:
+    """A file that is not used, and why."""
+
+    name: str
+    reason: SkipReason
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.reason.value}: {self.detail}" if self.detail else self.reason.value
+
+
+@dataclass(frozen=True, slots=True)
+class GeoPosition:
+    """A WGS84 position: latitude and longitude in degrees, altitude in metres if known."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Exif:
+    """What the camera wrote about a photo; ``None`` or empty where it wrote nothing usable.
+
+    ``orientation`` is EXIF's 1 to 8; pixels are kept as stored, as COLMAP does.
+    """
+
+    make: str = ""
+    model: str = ""
+    focal_length_mm: float | None = None
+    focal_length_35mm: float | None = None
+    captured_at: datetime | None = None
+    position: GeoPosition | None = None
+    orientation: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Photo:
+    """A photo in memory.
+
+    ``name`` is the path below the photo folder with forward slashes, as COLMAP names images.
+    ``pixels`` is (h, w, 3) uint8 RGB, reduced to the working size and not rotated by EXIF.
+    ``width`` and ``height`` are those of the file; keypoints and cameras refer to them.
+    ``digest`` identifies the file's bytes.
+    """
+
+    name: str
+    path: Path
+    pixels: Uint8Array
+    width: int
+    height: int
+    digest: str
+    exif: Exif = field(default_factory=Exif)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Features:
+    """What is remembered of a photo's content, strongest keypoint first.
+
+    ``keypoints`` (N, 4) float32: x, y, scale, orientation (radians), in pixels of the file, the
+    top-left pixel centred at (0.5, 0.5) as in COLMAP. ``descriptors`` (N, 128) uint8: RootSIFT
+    times 512, as COLMAP stores them. ``colors`` (N, 3) uint8 RGB under each keypoint.
+    """
+
+    keypoints: Float32Array
+    descriptors: Uint8Array
+    colors: Uint8Array
+
+    def __len__(self) -> int:
+        return len(self.keypoints)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DescribedPhoto:
+    """A photo that is ready to be retrieved, matched and mapped; its pixels are gone."""
+
+    name: str
+    path: Path
+    width: int
+    height: int
+    digest: str
+    exif: Exif
+    features: Features
+    global_vector: Float32Array
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A photo that may overlap the query: ``cosine`` of the global vectors in [-1, 1], and the
+    SIFT matches that survived RANSAC (``None`` where the candidate was not re-ranked)."""
+
+    image_id: int
+    cosine: float
+    inliers: int | None = None
+
+
+class Rejection(Enum):
+    """Why two photos have no two-view geometry."""
+
+    TOO_FEW_MATCHES = "too few tentative matches"
+    NO_EPIPOLAR_GEOMETRY = "no epipolar geometry"
+    TOO_FEW_INLIERS = "too few inliers"
+    WATERMARK = "watermark"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairGeometry:
+    """Verified overlap of two photos.
+
+    ``matches`` (M, 2) uint32: tentative matches, keypoint indices in photo 1 and photo 2.
+    ``two_view_geometry`` holds the inliers among them and cam2_from_cam1.
+    """
+
+    image_id1: int
+    image_id2: int
+    matches: Uint32Array
+    two_view_geometry: pycolmap.TwoViewGeometry
+
+    @property
+    def num_inliers(self) -> int:
+        return len(self.two_view_geometry.inlier_matches)
+
+
+@dataclass(frozen=True, slots=True)
+class StepReport:
+    """What became of one photo when it arrived.
+
+    ``registered`` names every photo placed by this step: this one, and waiting ones.
+    ``seconds`` is by stage. ``skipped`` is set when the photo was not used at all.
+    """
+
+    name: str
+    skipped: Skipped | None = None
+    candidates: tuple[Candidate, ...] = ()
+    most_relevant: str | None = None
+    num_keypoints: int = 0
+    num_verified_pairs: int = 0
+    registered: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+    events: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        return {
+            "name": self.name,
+            "skipped": None
+            if self.skipped is None
+            else {"reason": self.skipped.reason.value, "detail": self.skipped.detail},
+            "most_relevant": self.most_relevant,
+            "num_keypoints": self.num_keypoints,
+            "num_verified_pairs": self.num_verified_pairs,
+            "registered": list(self.registered),
+            "seconds": {stage: round(value, 4) for stage, value in self.seconds.items()},
+            "events": list(self.events),
+        }
