@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,31 +161,35 @@ class PairGeometry:
 class StepReport:
     """What became of one photo when it arrived.
 
+    ``image_id`` is None and ``skipped`` is set when the photo was not used at all.
+    ``candidates`` are ordered as re-ranked; ``most_relevant`` is the first of them.
     ``registered`` names every photo placed by this step: this one, and waiting ones.
-    ``seconds`` is by stage. ``skipped`` is set when the photo was not used at all.
+    ``num_registered`` and ``num_points`` are those of all models after this step.
+    ``seconds`` is by stage, and work done ahead counts too. ``events`` tells what was started,
+    relaxed or joined.
     """
 
     name: str
+    image_id: int | None = None
     skipped: Skipped | None = None
     candidates: tuple[Candidate, ...] = ()
     most_relevant: str | None = None
     num_keypoints: int = 0
-    num_verified_pairs: int = 0
+    verified: tuple[str, ...] = ()
     registered: tuple[str, ...] = ()
+    num_registered: int = 0
+    num_points: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     events: tuple[str, ...] = ()
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, ready for JSON."""
-        return {
-            "name": self.name,
-            "skipped": None
-            if self.skipped is None
-            else {"reason": self.skipped.reason.value, "detail": self.skipped.detail},
-            "most_relevant": self.most_relevant,
-            "num_keypoints": self.num_keypoints,
-            "num_verified_pairs": self.num_verified_pairs,
-            "registered": list(self.registered),
-            "seconds": {stage: round(value, 4) for stage, value in self.seconds.items()},
-            "events": list(self.events),
-        }
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelSummary:
+    """A finished model and the folder it was written to."""
+
+    path: Path
+    reconstruction: pycolmap.Reconstruction
+    num_registered: int
+    num_points: int
+    mean_reprojection_error_px: float
+    mean_track_length: float

@@ -1,0 +1,53 @@
+"""All options of a session in one place; each part is checked when it is built."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sfm_front.cameras import CameraOptions
+from sfm_front.errors import ConfigError
+from sfm_front.mapping.atlas import AtlasOptions
+from sfm_front.matching import MatchingOptions
+from sfm_front.retrieval.rerank import RerankOptions
+from sfm_front.retrieval.retriever import RetrievalOptions
+from sfm_front.verification import VerificationOptions
+
+
+def available_cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionOptions:
+    """How photos are described, retrieved, matched and mapped.
+
+    ``max_image_size``: long side in pixels that photos are reduced to. ``max_features``: SIFT
+    keypoints a photo. ``global_descriptor``: a name that ``features.global_descriptor.resolve``
+    knows; ``weights``: a file for its network; ``device``: of its network.
+    ``matched``: re-ranked photos that are matched in full. ``threads``: cores to use.
+    ``text``: write models in COLMAP's text form too.
+    """
+
+    max_image_size: int = 1600
+    max_features: int = 4000
+    global_descriptor: str = "auto"
+    weights: Path | None = None
+    device: str = "cpu"
+    matched: int = 8
+    text: bool = False
+    threads: int = field(default_factory=available_cores)
+    cameras: CameraOptions = field(default_factory=CameraOptions)
+    retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
+    rerank: RerankOptions = field(default_factory=RerankOptions)
+    matching: MatchingOptions = field(default_factory=MatchingOptions)
+    verification: VerificationOptions = field(default_factory=VerificationOptions)
+    atlas: AtlasOptions = field(default_factory=AtlasOptions)
+
+    def __post_init__(self) -> None:
+        if self.matched < 1:
+            raise ConfigError(f"matched must be at least 1, got {self.matched}")
+        if self.threads < 1:
+            raise ConfigError(f"threads must be at least 1, got {self.threads}")

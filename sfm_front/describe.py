@@ -1,0 +1,110 @@
+"""Photos → DescribedPhotos: SIFT and the global vector side by side, the next photos ahead."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
+from types import TracebackType
+
+import cv2
+
+from sfm_front.features.global_descriptor import GlobalDescriptor
+from sfm_front.features.sift import SiftExtractor
+from sfm_front.images import PhotoReader
+from sfm_front.source import PhotoPath
+from sfm_front.stopwatch import Stopwatch
+from sfm_front.types import DescribedPhoto, Float32Array, Photo, Skipped, SkipReason
+from sfm_front.workers import use_one_thread
+
+
+class PhotoDescriber:
+    """Reads photos and describes them, several at a time.
+
+    Of one photo, SIFT and the global vector's pixel share are computed in two parallel threads,
+    as in the paper; VLAD follows SIFT.
+    """
+
+    def __init__(
+        self,
+        reader: PhotoReader,
+        sift: SiftExtractor,
+        global_descriptor: GlobalDescriptor,
+        *,
+        num_threads: int,
+    ) -> None:
+        """``num_threads``: photos described at a time."""
+        self._reader = reader
+        self._sift = sift
+        self._global = global_descriptor
+        self._num_threads = num_threads
+        self._photos = ThreadPoolExecutor(num_threads, "sfm-describe", use_one_thread)
+        self._networks = ThreadPoolExecutor(1, "sfm-network")
+
+    def describe(self, photo: PhotoPath) -> DescribedPhoto | Skipped:
+        """Read one photo and describe it in the calling thread, networks in a second one."""
+        clock = Stopwatch()
+        with clock.stage("read"):
+            read = self._reader.read(photo.path, photo.name)
+        if isinstance(read, Skipped):
+            return read
+        network = self._networks.submit(self._describe_pixels, read, clock)
+        with clock.stage("sift"):
+            features = self._sift.extract(read)
+        if len(features) == 0:
+            network.cancel()
+            return Skipped(photo.name, SkipReason.NO_FEATURES, "no texture to hold on to")
+        with clock.stage("vlad"):
+            of_descriptors = self._global.describe_local(features.descriptors)
+        return DescribedPhoto(
+            name=read.name,
+            path=read.path,
+            width=read.width,
+            height=read.height,
+            digest=read.digest,
+            exif=read.exif,
+            features=features,
+            global_vector=self._global.join(network.result(), of_descriptors),
+            seconds=clock.seconds,
+        )
+
+    def stream(self, photos: Iterable[PhotoPath]) -> Iterator[DescribedPhoto | Skipped]:
+        """Describe photos in order, up to twice as many ahead as are worked on at a time."""
+        source = iter(photos)
+        # Whole photos side by side use the cores better than OpenCV's splitting of each.
+        threads_before = cv2.getNumThreads()
+        cv2.setNumThreads(1 if self._num_threads > 1 else threads_before)
+        ahead: deque[Future[DescribedPhoto | Skipped]] = deque()
+        try:
+            while True:
+                for photo in islice(source, 2 * self._num_threads - len(ahead)):
+                    ahead.append(self._photos.submit(self.describe, photo))
+                if not ahead:
+                    return
+                yield ahead.popleft().result()
+        finally:
+            cv2.setNumThreads(threads_before)
+            for future in ahead:
+                future.cancel()
+
+    def _describe_pixels(self, photo: Photo, clock: Stopwatch) -> Float32Array:
+        if not self._global.needs_pixels:
+            return self._global.describe_pixels(photo.pixels)
+        with clock.stage("network"):
+            return self._global.describe_pixels(photo.pixels)
+
+    def close(self) -> None:
+        self._photos.shutdown(cancel_futures=True)
+        self._networks.shutdown(cancel_futures=True)
+
+    def __enter__(self) -> PhotoDescriber:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()

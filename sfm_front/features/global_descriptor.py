@@ -1,0 +1,155 @@
+"""Global vectors by name: one description, or several joined into one vector.
+
+A joined vector holds its parts side by side, each of length 1 times the square root of its weight,
+so that the cosine of two photos is the weighted mean of the cosines of their parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from sfm_front.errors import ConfigError, DependencyError, WeightsError
+from sfm_front.features import weights_cache
+from sfm_front.features.cnn import NETWORKS, CnnDescriptor
+from sfm_front.features.vectors import unit_length
+from sfm_front.features.vlad import Vlad
+from sfm_front.features.weights_cache import Progress
+from sfm_front.types import Float32Array, Uint8Array
+
+AUTO = "auto"
+NAMES = (*NETWORKS, Vlad.name)
+
+AUTO_NETWORK = "resnet101_pool5"
+"""The network that ``auto`` joins with VLAD where it can: the paper's."""
+
+VLAD_WEIGHT = 0.7
+NETWORK_WEIGHT = 0.3
+
+
+class Describer(Protocol):
+    """One way to describe a photo, by its pixels (h, w, 3) or its SIFT descriptors (N, 128)."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def dimension(self) -> int: ...
+
+    @property
+    def fingerprint(self) -> str: ...
+
+    def describe(self, source: Uint8Array, /) -> Float32Array:
+        """(dimension,) float32 of length 1; zeros if there is nothing to describe."""
+        ...
+
+
+class GlobalDescriptor:
+    """What a photo is retrieved by: (dimension,) float32 of length 1, compared by cosine.
+
+    The pixels' share and the descriptors' share can be computed apart, so that networks run beside
+    SIFT; ``join`` makes the vector of both. Safe to share between threads.
+    """
+
+    def __init__(
+        self, *, networks: Sequence[Describer] = (), local: Sequence[Describer] = ()
+    ) -> None:
+        """``networks`` describe pixels, ``local`` SIFT descriptors; one in all at least."""
+        parts = (*networks, *local)
+        self.name = "+".join(part.name for part in parts)
+        self.dimension = sum(part.dimension for part in parts)
+        self.fingerprint = "+".join(part.fingerprint for part in parts)
+        """The same for two descriptors only if their vectors can be compared."""
+        self.needs_pixels = len(networks) > 0
+        total = NETWORK_WEIGHT * len(networks) + VLAD_WEIGHT * len(local)
+        self._networks = [(np.float32((NETWORK_WEIGHT / total) ** 0.5), part) for part in networks]
+        self._local = [(np.float32((VLAD_WEIGHT / total) ** 0.5), part) for part in local]
+
+    def describe_pixels(self, pixels: Uint8Array) -> Float32Array:
+        """(h, w, 3) uint8 RGB → the networks' share; empty if no part needs pixels."""
+        return _side_by_side([root * part.describe(pixels) for root, part in self._networks])
+
+    def describe_local(self, descriptors: Uint8Array) -> Float32Array:
+        """(N, 128) uint8 RootSIFT → VLAD's share; empty if no part needs descriptors."""
+        return _side_by_side([root * part.describe(descriptors) for root, part in self._local])
+
+    def join(self, of_pixels: Float32Array, of_descriptors: Float32Array) -> Float32Array:
+        """Both shares → (dimension,) float32 of length 1."""
+        # Not of length 1 already where a photo without features has no VLAD.
+        return unit_length(np.concatenate([of_pixels, of_descriptors]))
+
+    def describe(self, pixels: Uint8Array, descriptors: Uint8Array) -> Float32Array:
+        """The whole vector at once."""
+        return self.join(self.describe_pixels(pixels), self.describe_local(descriptors))
+
+
+def resolve(
+    name: str,
+    *,
+    weights: Path | None = None,
+    device: str = "cpu",
+    progress: Progress | None = None,
+) -> tuple[GlobalDescriptor, str | None]:
+    """The descriptor called ``name``, and what to tell the user about the choice, if anything.
+
+    ``name`` is one of ``NAMES``, several joined by ``+``, or ``auto``: ResNet101 joined with VLAD
+    if its weights are in the cache or can be had, else VLAD. ``weights`` is a file for the network
+    to use in place of the official one; ``progress`` hears of a download.
+
+    Raises:
+        ConfigError: no such name, one twice, or ``weights`` without exactly one network.
+        WeightsError: weights that were asked for by name or file cannot be had or used.
+        DependencyError: torch, asked for by a network's name, cannot be loaded.
+    """
+    if name == AUTO:
+        return _automatic(weights, device, progress)
+    parts = _split(name)
+    networks = [part for part in parts if part in NETWORKS]
+    if weights is not None and len(networks) != 1:
+        raise ConfigError(
+            f"--weights goes with one network of {', '.join(NETWORKS)}: "
+            f"{name!r} has {len(networks) or 'none'}"
+        )
+    describers = [_network(part, weights, device, progress) for part in networks]
+    local = [Vlad()] if Vlad.name in parts else []
+    return GlobalDescriptor(networks=describers, local=local), None
+
+
+def _automatic(
+    weights: Path | None, device: str, progress: Progress | None
+) -> tuple[GlobalDescriptor, str]:
+    joined = f"{AUTO_NETWORK}+{Vlad.name}"
+    if weights is not None:
+        descriptor, _ = resolve(joined, weights=weights, device=device)
+        return descriptor, f"global descriptor: {joined}, with weights from {weights.name}"
+    try:
+        descriptor, _ = resolve(joined, device=device, progress=progress)
+    except (WeightsError, DependencyError) as error:
+        return GlobalDescriptor(local=[Vlad()]), f"global descriptor: {Vlad.name}, because {error}"
+    return descriptor, f"global descriptor: {joined}, with torchvision's weights"
+
+
+def _split(name: str) -> list[str]:
+    parts = name.split("+")
+    valid = f"{', '.join(NAMES)}, any of them joined by '+', or {AUTO}"
+    for part in parts:
+        if part not in NAMES:
+            raise ConfigError(f"no global descriptor is called {part!r}: take {valid}")
+    if len(set(parts)) < len(parts):
+        raise ConfigError(f"global descriptor {name!r} names a part twice: take {valid}")
+    return parts
+
+
+def _network(
+    name: str, weights: Path | None, device: str, progress: Progress | None
+) -> CnnDescriptor:
+    if weights is None:
+        weights = weights_cache.cached_or_fetched(NETWORKS[name].weights_url, progress=progress)
+    return CnnDescriptor(name, weights=weights, device=device)
+
+
+def _side_by_side(parts: list[Float32Array]) -> Float32Array:
+    return np.concatenate(parts) if parts else np.zeros(0, np.float32)

@@ -1,0 +1,80 @@
+"""SIFT keypoints and RootSIFT descriptors of a photo."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from sfm_front.errors import ConfigError
+from sfm_front.types import Features, Float32Array, Photo, Uint8Array
+
+DESCRIPTOR_SCALE = 512.0
+
+
+class SiftExtractor:
+    """Finds the strongest SIFT keypoints of a photo. Safe to share between threads."""
+
+    def __init__(self, max_features: int = 4000) -> None:
+        """``max_features``: keypoints kept a photo, the ones of strongest response.
+
+        Raises ConfigError if it is below 1.
+        """
+        if max_features < 1:
+            raise ConfigError(f"max_features must be at least 1, got {max_features}")
+        self.max_features = max_features
+
+    def extract(self, photo: Photo) -> Features:
+        """Keypoints in pixels of the file, strongest first; none in a photo without texture."""
+        gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
+        # A detector for each call: OpenCV does not promise that one may be shared by threads.
+        detector = cv2.SIFT.create(nfeatures=self.max_features, enable_precise_upscale=True)
+        found, raw = detector.detectAndCompute(gray, None)
+        if not found or raw is None:
+            return Features(
+                np.zeros((0, 4), np.float32),
+                np.zeros((0, 128), np.uint8),
+                np.zeros((0, 3), np.uint8),
+            )
+        # OpenCV keeps every keypoint that ties with the last one: cut after sorting.
+        response = np.array([k.response for k in found], np.float32)
+        order = np.argsort(-response, kind="stable")[: self.max_features]
+        working = np.array([(*k.pt, k.size, k.angle) for k in found], np.float32)[order]
+        return Features(
+            _to_file_pixels(working, photo),
+            root_sift(np.asarray(raw, np.float32)[order]),
+            _colors_at(photo.pixels, working[:, :2]),
+        )
+
+
+def root_sift(raw: Float32Array) -> Uint8Array:
+    """SIFT (N, 128) float → RootSIFT (N, 128) uint8: L1-normalised, square root, times 512.
+
+    Source: Arandjelovic and Zisserman, "Three things everyone should know to improve object
+    retrieval", CVPR 2012; quantised as COLMAP stores descriptors.
+    """
+    total = np.maximum(raw.sum(axis=1, keepdims=True), 1e-9)
+    scaled = np.rint(np.sqrt(raw / total) * DESCRIPTOR_SCALE)
+    quantised: Uint8Array = np.minimum(scaled, 255).astype(np.uint8)
+    return quantised
+
+
+def _to_file_pixels(working: Float32Array, photo: Photo) -> Float32Array:
+    """x, y, diameter, degrees at working size → x, y, scale, radians at the size of the file.
+
+    OpenCV centres the top-left pixel at (0, 0), COLMAP at (0.5, 0.5).
+    """
+    height, width = photo.pixels.shape[:2]
+    scale_x, scale_y = photo.width / width, photo.height / height
+    keypoints = np.empty_like(working)
+    keypoints[:, 0] = (working[:, 0] + 0.5) * scale_x
+    keypoints[:, 1] = (working[:, 1] + 0.5) * scale_y
+    keypoints[:, 2] = working[:, 2] * (0.5 * np.sqrt(scale_x * scale_y))
+    keypoints[:, 3] = np.deg2rad(working[:, 3])
+    return keypoints
+
+
+def _colors_at(pixels: Uint8Array, xy: Float32Array) -> Uint8Array:
+    height, width = pixels.shape[:2]
+    columns = np.clip(np.rint(xy[:, 0]).astype(np.intp), 0, width - 1)
+    rows = np.clip(np.rint(xy[:, 1]).astype(np.intp), 0, height - 1)
+    return pixels[rows, columns]

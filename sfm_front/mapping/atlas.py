@@ -1,0 +1,213 @@
+"""Several models at once over one scene: start, grow, join, and settle at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from sfm_front.mapping.initialization import InitializationOptions, Initializer
+from sfm_front.mapping.mapper import MapperOptions, Model
+from sfm_front.mapping.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtlasOptions:
+    """When models are started and kept.
+
+    ``min_second_model``: photos that must wait, linked to each other, before a further model is
+    started. ``min_model_size``: photos of its own that a further model must have to be kept.
+    ``min_link``: inliers of a pair that should have brought a photo into a model.
+    ``min_share``: of the photos linked to a model that it should hold itself.
+    ``fresh_starts``: how many starts of each relaxation the end of a session may try.
+    ``max_failures``: fresh starts that may grow far and be no better before it gives up.
+    """
+
+    min_second_model: int = 4
+    min_model_size: int = 3
+    min_link: int = 45
+    min_share: float = 0.75
+    fresh_starts: int = 2
+    max_failures: int = 1
+    initialization: InitializationOptions = field(default_factory=InitializationOptions)
+    mapper: MapperOptions = field(default_factory=MapperOptions)
+
+
+class Atlas:
+    """All models of a session, largest first.
+
+    A photo may be in several models while they grow: the largest takes the photos of smaller
+    ones as soon as it sees them, and a model that has been taken over whole is dropped. That
+    joins models, and it forgives a bad start: what grows from the photos that did not fit
+    takes over what did.
+    """
+
+    def __init__(self, scene: Scene, options: AtlasOptions | None = None) -> None:
+        self._scene = scene
+        self._options = options or AtlasOptions()
+        self._initializer = Initializer(
+            scene, self._options.initialization, self._options.mapper
+        )
+        self._events: list[str] = []
+        self.models: list[Model] = []
+
+    @property
+    def registered(self) -> set[int]:
+        """Image ids of the photos that are in some model."""
+        return set().union(*(model.registered for model in self.models))
+
+    @property
+    def waiting(self) -> list[int]:
+        """Image ids of the photos that are in no model, in order of arrival."""
+        registered = self.registered
+        return [i for i in self._scene.image_ids if i not in registered]
+
+    @property
+    def num_points(self) -> int:
+        """3-D points of all models."""
+        return sum(model.num_points for model in self.models)
+
+    def why_not_registered(self, image_id: int) -> str:
+        """What keeps a waiting photo out of the models, in words."""
+        neighbors = self._scene.neighbors(image_id).keys()
+        if not neighbors:
+            return "no verified matches with any photo"
+        if not neighbors & self.registered:
+            return "verified matches only with photos that are not registered"
+        seen = max(model.num_visible_points(image_id) for model in self.models)
+        return f"no pose fits the {seen} model points it sees"
+
+    def take_events(self) -> tuple[str, ...]:
+        """What was started, relaxed, restarted or joined since the last call."""
+        events, self._events = tuple(self._events), []
+        return events
+
+    def add(self, image_id: int) -> list[int]:
+        """Take in a photo of the scene and place all that can be placed.
+
+        Returns the image ids that are in some model now and were in none before.
+        """
+        before = self.registered
+        for model in self.models:
+            model.extend(image_id)
+        self._grow()
+        if image_id in self.waiting:
+            self._start_near(image_id)
+        return sorted(self.registered - before)
+
+    def finish(self) -> None:
+        """Retry what waits, start afresh where the stream began badly, refine everything."""
+        self._settle()
+        self._start_afresh()
+        self._start_leftovers()
+        self._drop_small()
+        for model in self.models:
+            placed = model.grow_without_structure(self.waiting)
+            if placed:
+                self._events.append(f"{len(placed)} photos registered without structure")
+        self._settle()
+        for model in self.models:
+            model.refine()
+
+    def _grow(self) -> bool:
+        """Grow every model, the largest first; True if any grew."""
+        grew = False
+        for model in list(self.models):
+            if model is self.models[0]:
+                candidates = set(self._scene.image_ids) - model.registered
+            else:
+                candidates = set(self.waiting)
+            grew |= bool(model.grow(candidates))
+        self._join()
+        return grew
+
+    def _join(self) -> None:
+        """Sort models by size and drop those that larger ones hold."""
+        self.models.sort(key=lambda model: -model.num_registered)
+        covered: set[int] = set()
+        kept: list[Model] = []
+        for model in self.models:
+            own = model.registered - covered
+            if own:
+                kept.append(model)
+                covered |= own
+            else:
+                self._events.append(f"model of {model.num_registered} photos joined to a larger")
+        self.models = kept
+
+    def _start_near(self, image_id: int) -> None:
+        """Start a model among waiting photos linked to this one, if a pair is good enough."""
+        group = self._scene.component([image_id], among=set(self.waiting))
+        if self.models and len(group) < self._options.min_second_model:
+            return
+        started = self._initializer.start(group)
+        if started is not None:
+            model, event = started
+            self._events.append(event)
+            self.models.append(model)
+            self._grow()
+
+    def _settle(self) -> None:
+        """Refine and grow in turn until nothing more registers."""
+        for model in self.models:
+            model.forget_failures()
+        while self._grow():
+            for model in self.models:
+                model.refine()
+                model.forget_failures()
+
+    def _start_afresh(self) -> None:
+        """Where the largest model misses photos well linked to it, grow it anew.
+
+        The stream had to take the first pair that would do; the whole graph offers better ones.
+        The better of old and new stays.
+        """
+        failures = 0
+        for fresh, event in self._initializer.best_starts(self._options.fresh_starts):
+            largest = self.models[0] if self.models else None
+            if largest is not None and not self._misses(largest):
+                return
+            fresh.grow(set(self._scene.image_ids))
+            if largest is None or fresh.num_registered > largest.num_registered:
+                self._events.append(f"grown afresh: {event}")
+                self.models.insert(0, fresh)
+                self._settle()
+            elif 2 * fresh.num_registered > largest.num_registered:
+                # A start that carried far and still placed no more: another hardly will.
+                failures += 1
+                if failures == self._options.max_failures:
+                    return
+
+    def _misses(self, model: Model) -> bool:
+        """Whether photos well linked to a model are in none, or too many in others."""
+        linked = self._scene.component(model.registered, min_inliers=self._options.min_link)
+        if linked - self.registered:
+            return True
+        return model.num_registered < self._options.min_share * len(linked)
+
+    def _start_leftovers(self) -> None:
+        """Further models from photos that are linked to each other and fit nowhere."""
+        seen: set[int] = set()
+        for image_id in self.waiting:
+            if image_id in seen or image_id in self.registered:
+                continue
+            group = self._scene.component([image_id], among=set(self.waiting))
+            seen |= group
+            if len(group) < self._options.min_model_size:
+                continue
+            started = self._initializer.start(group)
+            if started is not None:
+                model, event = started
+                self._events.append(event)
+                self.models.append(model)
+                self._settle()
+
+    def _drop_small(self) -> None:
+        covered: set[int] = set()
+        kept: list[Model] = []
+        for model in self.models:
+            own = model.registered - covered
+            if not kept or len(own) >= self._options.min_model_size:
+                kept.append(model)
+                covered |= own
+            else:
+                self._events.append(f"model with only {len(own)} photos of its own dropped")
+        self.models = kept

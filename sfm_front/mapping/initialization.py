@@ -1,0 +1,98 @@
+"""Which pair to start a model from, and what to ask of it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+
+from sfm_front.mapping.mapper import InitialPairDemands, MapperOptions, Model
+from sfm_front.mapping.scene import Scene
+
+_ANGLE_TOLERANCE = 0.7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relaxation:
+    """What an initial pair must show once this many photos wait."""
+
+    min_waiting: int
+    demands: InitialPairDemands
+
+
+@dataclass(frozen=True, kw_only=True)
+class InitializationOptions:
+    """``relaxations``: from COLMAP's own demands downwards; nadir flights need a smaller angle,
+    and driving along a street 1° and forward motion. ``max_trials``: pairs estimated each time
+    a photo arrives."""
+
+    relaxations: tuple[Relaxation, ...] = (
+        Relaxation(
+            min_waiting=2, demands=InitialPairDemands(min_angle_deg=16, min_inliers=100)
+        ),
+        Relaxation(min_waiting=4, demands=InitialPairDemands(min_angle_deg=8, min_inliers=60)),
+        Relaxation(
+            min_waiting=6,
+            demands=InitialPairDemands(min_angle_deg=4, min_inliers=50, max_forward_motion=1),
+        ),
+        Relaxation(
+            min_waiting=10,
+            demands=InitialPairDemands(min_angle_deg=1, min_inliers=50, max_forward_motion=1),
+        ),
+    )
+    max_trials: int = 4
+
+
+class Initializer:
+    """Starts models. A pair is tried once at each relaxation."""
+
+    def __init__(
+        self, scene: Scene, options: InitializationOptions, mapper_options: MapperOptions
+    ) -> None:
+        self._scene = scene
+        self._options = options
+        self._mapper_options = mapper_options
+        self._tried: set[tuple[int, int, int]] = set()
+
+    def start(self, group: Collection[int]) -> tuple[Model, str] | None:
+        """A model of two photos of the group, the strictest demands and strongest pairs first.
+
+        Returns it with a line on how it began, or None when the trials are used up.
+        """
+        trials = 0
+        for level, relaxation in enumerate(self._options.relaxations):
+            if len(group) < relaxation.min_waiting:
+                break
+            demanded_deg = relaxation.demands.min_angle_deg
+            for pair in self._scene.pairs(group):
+                if (*pair, level) in self._tried:
+                    continue
+                # The angle is known from verification, with the focal length's error in it.
+                if self._scene.angle_deg(pair) < _ANGLE_TOLERANCE * demanded_deg:
+                    continue
+                if trials == self._options.max_trials:
+                    return None
+                self._tried.add((*pair, level))
+                trials += 1
+                model = Model(self._scene, self._mapper_options)
+                if model.initialize(*pair, relaxation.demands):
+                    return model, _describe(pair, relaxation.demands)
+        return None
+
+    def best_starts(self, per_relaxation: int) -> Iterator[tuple[Model, str]]:
+        """Models of two photos from the pairs that COLMAP finds best in the whole scene."""
+        for relaxation in self._options.relaxations:
+            finder = Model(self._scene, self._mapper_options)
+            for _ in range(per_relaxation):
+                pair = finder.find_initial_pair(relaxation.demands)
+                if pair is None:
+                    break
+                model = Model(self._scene, self._mapper_options)
+                if model.initialize(*pair, relaxation.demands):
+                    yield model, _describe(pair, relaxation.demands)
+
+
+def _describe(pair: tuple[int, int], demands: InitialPairDemands) -> str:
+    return (
+        f"model started from images {pair[0]} and {pair[1]}, "
+        f"demanding {demands.min_angle_deg:g} degrees and {demands.min_inliers} inliers"
+    )

@@ -1,0 +1,58 @@
+"""Fine retrieval: re-order candidates by SIFT matches that survive RANSAC."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from sfm_front.errors import ConfigError
+from sfm_front.matching import MatchingOptions, match
+from sfm_front.types import Candidate
+from sfm_front.verification import Verifier, View
+from sfm_front.workers import Workers
+
+
+@dataclass(frozen=True, kw_only=True)
+class RerankOptions:
+    """``max_features``: strongest features of each photo that are matched."""
+
+    max_features: int = 800
+
+    def __post_init__(self) -> None:
+        if self.max_features < 8:
+            raise ConfigError(f"rerank max_features must be at least 8, got {self.max_features}")
+
+
+class Reranker:
+    """Counts verified matches between a query and each of its candidates."""
+
+    def __init__(
+        self,
+        options: RerankOptions,
+        matching: MatchingOptions,
+        verifier: Verifier,
+        workers: Workers,
+    ) -> None:
+        self._options = options
+        self._matching = matching
+        self._verifier = verifier
+        self._workers = workers
+
+    def rerank(
+        self, query: View, candidates: list[Candidate], views: Mapping[int, View]
+    ) -> list[Candidate]:
+        """The same candidates with their inliers, most inliers first, ties by cosine."""
+
+        def count(candidate: Candidate) -> Candidate:
+            view = views[candidate.image_id]
+            limit = self._options.max_features
+            matches = match(
+                query.features.descriptors[:limit],
+                view.features.descriptors[:limit],
+                self._matching,
+            )
+            inliers = self._verifier.count_inliers(query, view, matches)
+            return replace(candidate, inliers=inliers)
+
+        counted = self._workers.map(count, candidates)
+        return sorted(counted, key=lambda c: (-(c.inliers or 0), -c.cosine))

@@ -1,0 +1,200 @@
+"""One photo's path: describe, retrieve, verify, store, map, remember."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from sfm_front.cameras import CameraCatalog
+from sfm_front.config import SessionOptions
+from sfm_front.describe import PhotoDescriber
+from sfm_front.errors import InputError
+from sfm_front.export import export_models
+from sfm_front.features.global_descriptor import resolve
+from sfm_front.features.sift import SiftExtractor
+from sfm_front.images import DuplicateFinder, PhotoReader
+from sfm_front.mapping.atlas import Atlas
+from sfm_front.mapping.scene import Scene
+from sfm_front.matching import match
+from sfm_front.report import Report
+from sfm_front.retrieval.rerank import Reranker
+from sfm_front.retrieval.retriever import Retriever
+from sfm_front.source import PhotoPath
+from sfm_front.stopwatch import Stopwatch
+from sfm_front.store import Store
+from sfm_front.types import (
+    Candidate,
+    DescribedPhoto,
+    ModelSummary,
+    PairGeometry,
+    Rejection,
+    Skipped,
+    StepReport,
+    Uint32Array,
+)
+from sfm_front.verification import Verifier, View
+from sfm_front.workers import Workers
+
+
+class Session:
+    """Reconstructs photos that arrive one at a time.
+
+    ::
+
+        with Session(Path("outputs/flight")) as session:
+            for path in paths:
+                print(session.add(path).registered)
+            models = session.finish()
+
+    ``output`` receives ``database.db``, ``retrieval.jsonl``, ``report.json`` and ``sparse/``.
+    """
+
+    def __init__(self, output: Path, options: SessionOptions | None = None) -> None:
+        """Raises InputError if ``output`` already holds a session's database."""
+        self.options = options or SessionOptions()
+        self.output = output
+        database = output / "database.db"
+        if database.exists():
+            raise InputError(
+                f"{output}: holds a reconstruction already. Give another --output, "
+                "or --overwrite to replace it."
+            )
+        descriptor, self.message = resolve(
+            self.options.global_descriptor,
+            weights=self.options.weights,
+            device=self.options.device,
+        )
+        output.mkdir(parents=True, exist_ok=True)
+        threads = self.options.threads
+        self._describer = PhotoDescriber(
+            PhotoReader(max_image_size=self.options.max_image_size),
+            SiftExtractor(self.options.max_features),
+            descriptor,
+            num_threads=threads,
+        )
+        self._workers = Workers(threads)
+        self._verifier = Verifier(self.options.verification)
+        self._retriever = Retriever(
+            self.options.retrieval,
+            descriptor.dimension,
+            Reranker(self.options.rerank, self.options.matching, self._verifier, self._workers),
+        )
+        self._duplicates = DuplicateFinder()
+        self._cameras = CameraCatalog(self.options.cameras)
+        self._store = Store(database)
+        self._scene = Scene()
+        self._atlas = Atlas(self._scene, self.options.atlas)
+        self._views: dict[int, View] = {}
+        self._names: dict[int, str] = {}
+        self._report = Report(output)
+
+    def add(self, path: Path, name: str | None = None) -> StepReport:
+        """Take in one photo; ``name`` is what it is called in the models (default: the file's)."""
+        return self.take(self._describer.describe(PhotoPath(name or path.name, path)))
+
+    def stream(self, photos: Iterable[PhotoPath]) -> Iterator[StepReport]:
+        """Take in photos in order, the next ones described while one is matched and mapped."""
+        for described in self._describer.stream(photos):
+            yield self.take(described)
+
+    def take(self, photo: DescribedPhoto | Skipped) -> StepReport:
+        """Take in a photo that is described already."""
+        if isinstance(photo, DescribedPhoto):
+            photo = self._duplicates.check(photo.name, photo.digest) or photo
+        if isinstance(photo, Skipped):
+            step = StepReport(photo.name, skipped=photo)
+        else:
+            step = self._place(photo)
+        self._report.add(step)
+        return step
+
+    def finish(self) -> list[ModelSummary]:
+        """Place what can still be placed, refine, and export all models, the largest first."""
+        clock = Stopwatch()
+        with clock.stage("finish"):
+            self._atlas.finish()
+        with clock.stage("export"):
+            models = export_models(
+                [model.reconstruction for model in self._atlas.models],
+                {image_id: view.features.colors for image_id, view in self._views.items()},
+                self.output / "sparse",
+                text=self.options.text,
+            )
+        self.report = self._report.finish(
+            models,
+            {i: self._atlas.why_not_registered(i) for i in self._atlas.waiting},
+            seconds=clock.seconds,
+            events=self._atlas.take_events(),
+        )
+        return models
+
+    def close(self) -> None:
+        self._describer.close()
+        self._workers.close()
+        self._store.close()
+        self._report.close()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _place(self, photo: DescribedPhoto) -> StepReport:
+        """The method: retrieve, verify, store, map, remember."""
+        clock = Stopwatch()
+        image_id = len(self._views) + 1
+        camera = self._cameras.camera_for(photo).camera
+        view = View(image_id, camera, photo.features)
+        with clock.stage("retrieve"):
+            candidates = self._retriever.candidates(photo.global_vector)
+        with clock.stage("rerank"):
+            candidates = self._retriever.rerank(view, candidates)
+        pairs = self._verify(view, candidates[: self.options.matched], clock)
+        with clock.stage("store"):
+            self._store.write(image_id, photo, camera, pairs)
+        with clock.stage("map"):
+            self._scene.add(image_id, photo.name, camera, photo.features.keypoints, pairs)
+            registered = self._atlas.add(image_id)
+        self._retriever.remember(view, photo.global_vector)
+        self._views[image_id] = view
+        self._names[image_id] = photo.name
+        return StepReport(
+            name=photo.name,
+            image_id=image_id,
+            candidates=tuple(candidates),
+            most_relevant=self._names[candidates[0].image_id] if candidates else None,
+            num_keypoints=len(photo.features),
+            verified=tuple(self._names[pair.image_id2] for pair in pairs),
+            registered=tuple(self._names[i] for i in registered),
+            num_registered=len(self._atlas.registered),
+            num_points=self._atlas.num_points,
+            seconds={**photo.seconds, **clock.seconds},
+            events=self._atlas.take_events(),
+        )
+
+    def _verify(
+        self, view: View, candidates: Sequence[Candidate], clock: Stopwatch
+    ) -> list[PairGeometry]:
+        """Match a photo with its best candidates on all features; keep the verified pairs."""
+        others = [self._views[candidate.image_id] for candidate in candidates]
+
+        def match_with(other: View) -> Uint32Array:
+            return match(
+                view.features.descriptors, other.features.descriptors, self.options.matching
+            )
+
+        def verify_with(tentative: tuple[View, Uint32Array]) -> PairGeometry | Rejection:
+            return self._verifier.verify(view, *tentative)
+
+        with clock.stage("match"):
+            matches = self._workers.map(match_with, others)
+        with clock.stage("verify"):
+            verified = self._workers.map(verify_with, zip(others, matches, strict=True))
+        return [pair for pair in verified if isinstance(pair, PairGeometry)]

@@ -1,0 +1,166 @@
+"""Tentative matches → PairGeometry, or the reason why not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import pycolmap
+from numpy.typing import NDArray
+
+from sfm_front.errors import ConfigError
+from sfm_front.types import Features, Float64Array, PairGeometry, Rejection, Uint32Array
+
+_WATERMARK = int(pycolmap.TwoViewGeometryConfiguration.WATERMARK)
+_WITH_ESSENTIAL_MATRIX = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerificationOptions:
+    """When two photos count as overlapping.
+
+    ``max_error_px``: epipolar error of an inlier, in pixels of the file.
+    ``min_inliers``: fewest inliers of a two-view geometry.
+    ``max_gate_trials``: samples of the fundamental-matrix gate.
+    ``model_sample``: inliers on which the two-view model is estimated; all are then counted.
+    ``seed``: of every random sample.
+    """
+
+    max_error_px: float = 4.0
+    min_inliers: int = 15
+    max_gate_trials: int = 2000
+    model_sample: int = 300
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.max_error_px <= 0:
+            raise ConfigError(f"max_error_px must be above 0, got {self.max_error_px}")
+        if self.min_inliers < 8:
+            raise ConfigError(f"min_inliers must be at least 8, got {self.min_inliers}")
+        if self.model_sample < self.min_inliers:
+            raise ConfigError(
+                f"model_sample must be at least min_inliers ({self.min_inliers}), "
+                f"got {self.model_sample}"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One side of a pair: a photo's image id, its camera and its features."""
+
+    image_id: int
+    camera: pycolmap.Camera
+    features: Features
+
+    def points(self, indices: NDArray[Any]) -> Float64Array:
+        """(K, 2) pixels of the keypoints with these indices."""
+        return self.features.keypoints[indices, :2].astype(np.float64)
+
+    def rays(self, indices: NDArray[Any]) -> Float64Array:
+        """(K, 3) directions in the camera, z = 1; nan where undistortion fails."""
+        undistorted = self.camera.cam_from_img(self.points(indices))
+        return np.column_stack([np.asarray(undistorted, np.float64), np.ones(len(indices))])
+
+
+class Verifier:
+    """Estimates two-view geometry. The same input gives the same output; threads may share it."""
+
+    def __init__(self, options: VerificationOptions | None = None) -> None:
+        self.options = options or VerificationOptions()
+        self._model_options = pycolmap.TwoViewGeometryOptions()
+        self._model_options.min_num_inliers = self.options.min_inliers
+        self._model_options.compute_relative_pose = True
+        ransac = self._model_options.ransac
+        ransac.max_error = self.options.max_error_px
+        ransac.random_seed = self.options.seed
+        # The gate leaves hardly an outlier: COLMAP's 100 trials would mostly repeat themselves.
+        ransac.min_num_trials = 30
+
+    def count_inliers(self, view1: View, view2: View, matches: Uint32Array) -> int:
+        """How many matches survive RANSAC on a fundamental matrix; 0 where there is none."""
+        return int(np.count_nonzero(self._gate(view1, view2, matches)))
+
+    def verify(
+        self, view1: View, view2: View, matches: Uint32Array
+    ) -> PairGeometry | Rejection:
+        """Two-view geometry of two photos from their tentative matches (M, 2).
+
+        A fundamental matrix (OpenCV's USAC) gates first: where nothing matches it takes
+        milliseconds, COLMAP's calibrated estimate up to a second. The calibrated estimate then
+        sees a sample of the survivors, and its essential matrix is tested on every match.
+        """
+        options = self.options
+        if len(matches) < options.min_inliers:
+            return Rejection.TOO_FEW_MATCHES
+        gate = self._gate(view1, view2, matches)
+        survivors = np.flatnonzero(gate)
+        if len(survivors) < options.min_inliers:
+            return Rejection.NO_EPIPOLAR_GEOMETRY
+        geometry = self._estimate(view1, view2, matches[self._sample(survivors)])
+        if geometry.config == _WATERMARK:
+            return Rejection.WATERMARK
+        if len(geometry.inlier_matches) < options.min_inliers:
+            return Rejection.TOO_FEW_INLIERS
+        if geometry.config == _WITH_ESSENTIAL_MATRIX and geometry.E is not None:
+            consistent = self._essential_inliers(geometry.E, view1, view2, matches)
+            if np.count_nonzero(consistent) > len(survivors):
+                survivors = np.flatnonzero(consistent)
+        geometry.inlier_matches = matches[survivors]
+        return PairGeometry(view1.image_id, view2.image_id, matches, geometry)
+
+    def _gate(self, view1: View, view2: View, matches: Uint32Array) -> NDArray[np.bool_]:
+        """(M,) inliers of the best fundamental matrix; all False where there is none."""
+        nothing = np.zeros(len(matches), np.bool_)
+        if len(matches) < 8:
+            return nothing
+        try:
+            _, mask = cv2.findFundamentalMat(
+                view1.points(matches[:, 0]),
+                view2.points(matches[:, 1]),
+                cv2.USAC_ACCURATE,
+                self.options.max_error_px,
+                0.999,
+                self.options.max_gate_trials,
+            )
+        except cv2.error:
+            # OpenCV 5.0 asserts inside USAC where no sample gave a model, instead of saying so.
+            return nothing
+        return nothing if mask is None else mask.ravel().astype(np.bool_)
+
+    def _sample(self, survivors: NDArray[np.intp]) -> NDArray[np.intp]:
+        if len(survivors) <= self.options.model_sample:
+            return survivors
+        rng = np.random.default_rng(self.options.seed)
+        return np.sort(rng.choice(survivors, self.options.model_sample, replace=False))
+
+    def _estimate(
+        self, view1: View, view2: View, matches: Uint32Array
+    ) -> pycolmap.TwoViewGeometry:
+        aligned = np.repeat(np.arange(len(matches), dtype=np.uint32)[:, None], 2, axis=1)
+        return pycolmap.estimate_calibrated_two_view_geometry(
+            view1.camera,
+            view1.points(matches[:, 0]),
+            view2.camera,
+            view2.points(matches[:, 1]),
+            aligned,
+            self._model_options,
+        )
+
+    def _essential_inliers(
+        self, essential: Float64Array, view1: View, view2: View, matches: Uint32Array
+    ) -> NDArray[np.bool_]:
+        """(M,) matches whose Sampson error under x2ᵀ E x1 = 0 is within max_error_px."""
+        rays1 = view1.rays(matches[:, 0])
+        rays2 = view2.rays(matches[:, 1])
+        lines2 = rays1 @ essential.T
+        lines1 = rays2 @ essential
+        algebraic = np.einsum("ij,ij->i", rays2, lines2)
+        gradient = (lines1[:, :2] ** 2).sum(axis=1) + (lines2[:, :2] ** 2).sum(axis=1)
+        focal_px = 0.5 * (view1.camera.mean_focal_length() + view2.camera.mean_focal_length())
+        max_error = self.options.max_error_px / focal_px
+        # Written so that a ray that cannot be undistorted (nan) counts as an outlier.
+        inside: NDArray[np.bool_] = algebraic**2 <= max_error**2 * gradient
+        return inside
+
