@@ -1,3 +1,28 @@
-"""Structure-from-Motion that keeps up with the camera."""
+"""Structure-from-Motion that keeps up with the camera.
+
+``from sfm_front import Session, SessionOptions``: see ``sfm_front.session``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sfm_front.config import SessionOptions
+    from sfm_front.session import Session
 
 __version__ = "0.1.0"
+__all__ = ["Session", "SessionOptions", "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    # Loaded when asked for: pycolmap and OpenCV would delay the answer of --help.
+    if name == "Session":
+        from sfm_front.session import Session
+
+        return Session
+    if name == "SessionOptions":
+        from sfm_front.config import SessionOptions
+
+        return SessionOptions
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 
 from sfm_front import __version__, reconstruct
@@ -22,6 +23,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     _add(commands, "view", "look at a sparse model", view)
     arguments = parser.parse_args(argv)
     run: Callable[[argparse.Namespace], int] = arguments.run
+    # Pillow warns of damaged EXIF, line by line between the progress lines.
+    warnings.filterwarnings("ignore", module=r"PIL\.")
     try:
         return run(arguments)
     except SfmFrontError as error:

@@ -30,7 +30,7 @@ def read_exif(path: Path) -> Exif:
                 return Exif()
             file.seek(0)
             return exif_of(image_format.open(file))
-    except Exception:  # Broken headers raise anything; photos.read gives the reason later.
+    except Exception:  # Broken headers raise anything; PhotoReader will give the reason.
         return Exif()
 
 
