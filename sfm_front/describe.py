@@ -16,7 +16,6 @@ from sfm_front.images import PhotoReader
 from sfm_front.source import PhotoPath
 from sfm_front.stopwatch import Stopwatch
 from sfm_front.types import DescribedPhoto, Float32Array, Photo, Skipped, SkipReason
-from sfm_front.workers import use_one_thread
 
 
 class PhotoDescriber:
@@ -39,7 +38,7 @@ class PhotoDescriber:
         self._sift = sift
         self._global = global_descriptor
         self._num_threads = num_threads
-        self._photos = ThreadPoolExecutor(num_threads, "sfm-describe", use_one_thread)
+        self._photos = ThreadPoolExecutor(num_threads, "sfm-describe")
         self._networks = ThreadPoolExecutor(1, "sfm-network")
 
     def describe(self, photo: PhotoPath) -> DescribedPhoto | Skipped:
@@ -56,7 +55,7 @@ class PhotoDescriber:
             network.cancel()
             return Skipped(photo.name, SkipReason.NO_FEATURES, "no texture to hold on to")
         with clock.stage("vlad"):
-            of_descriptors = self._global.describe_local(features.descriptors)
+            of_features = self._global.describe_local(features)
         return DescribedPhoto(
             name=read.name,
             path=read.path,
@@ -65,7 +64,7 @@ class PhotoDescriber:
             digest=read.digest,
             exif=read.exif,
             features=features,
-            global_vector=self._global.join(network.result(), of_descriptors),
+            global_vector=self._global.join(network.result(), of_features),
             seconds=clock.seconds,
         )
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import TypeVar
 
-import faiss
+from threadpoolctl import threadpool_limits
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -16,16 +16,15 @@ Result = TypeVar("Result")
 class Workers:
     """Maps a function over items on ``num_threads`` threads; results come in the items' order.
 
-    Each thread has faiss to itself: one that splits every call over all cores would have
-    the threads wait for each other, which costs more than it gains.
+    While it is open, matrix products of this process run on the thread that asks for them: split
+    over all cores, they would have the threads wait for each other.
     """
 
     def __init__(self, num_threads: int) -> None:
         self._pool = (
-            ThreadPoolExecutor(num_threads, "sfm-pairs", initializer=use_one_thread)
-            if num_threads > 1
-            else None
+            ThreadPoolExecutor(num_threads, "sfm-pairs") if num_threads > 1 else None
         )
+        self._one_thread_a_product = threadpool_limits(1, user_api="blas")
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
         if self._pool is None:
@@ -46,8 +45,4 @@ class Workers:
     def close(self) -> None:
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
-
-
-def use_one_thread() -> None:
-    """Keep faiss calls of the calling thread on that thread."""
-    faiss.omp_set_num_threads(1)
+        self._one_thread_a_product.restore_original_limits()

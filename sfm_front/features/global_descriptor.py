@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from sfm_front.features.cnn import NETWORKS, CnnDescriptor
 from sfm_front.features.vectors import unit_length
 from sfm_front.features.vlad import Vlad
 from sfm_front.features.weights_cache import Progress
-from sfm_front.types import Float32Array, Uint8Array
+from sfm_front.types import Features, Float32Array, Uint8Array
 
 AUTO = "auto"
 NAMES = (*NETWORKS, Vlad.name)
@@ -30,8 +30,11 @@ VLAD_WEIGHT = 0.7
 NETWORK_WEIGHT = 0.3
 
 
-class Describer(Protocol):
-    """One way to describe a photo, by its pixels (h, w, 3) or its SIFT descriptors (N, 128)."""
+Source_contra = TypeVar("Source_contra", contravariant=True)
+
+
+class Describer(Protocol[Source_contra]):
+    """One way to describe a photo: by its pixels (h, w, 3) uint8 RGB, or by its features."""
 
     @property
     def name(self) -> str: ...
@@ -40,9 +43,11 @@ class Describer(Protocol):
     def dimension(self) -> int: ...
 
     @property
-    def fingerprint(self) -> str: ...
+    def fingerprint(self) -> str:
+        """The same for two describers only if their vectors can be compared."""
+        ...
 
-    def describe(self, source: Uint8Array, /) -> Float32Array:
+    def describe(self, source: Source_contra, /) -> Float32Array:
         """(dimension,) float32 of length 1; zeros if there is nothing to describe."""
         ...
 
@@ -50,40 +55,46 @@ class Describer(Protocol):
 class GlobalDescriptor:
     """What a photo is retrieved by: (dimension,) float32 of length 1, compared by cosine.
 
-    The pixels' share and the descriptors' share can be computed apart, so that networks run beside
+    The pixels' share and the features' share can be computed apart, so that networks run beside
     SIFT; ``join`` makes the vector of both. Safe to share between threads.
     """
 
     def __init__(
-        self, *, networks: Sequence[Describer] = (), local: Sequence[Describer] = ()
+        self,
+        *,
+        networks: Sequence[Describer[Uint8Array]] = (),
+        local: Sequence[Describer[Features]] = (),
     ) -> None:
-        """``networks`` describe pixels, ``local`` SIFT descriptors; one in all at least."""
-        parts = (*networks, *local)
+        """``networks`` describe pixels, ``local`` describe features; one in all at least."""
+        parts: list[Describer[Any]] = [*networks, *local]
         self.name = "+".join(part.name for part in parts)
         self.dimension = sum(part.dimension for part in parts)
         self.fingerprint = "+".join(part.fingerprint for part in parts)
-        """The same for two descriptors only if their vectors can be compared."""
         self.needs_pixels = len(networks) > 0
         total = NETWORK_WEIGHT * len(networks) + VLAD_WEIGHT * len(local)
-        self._networks = [(np.float32((NETWORK_WEIGHT / total) ** 0.5), part) for part in networks]
-        self._local = [(np.float32((VLAD_WEIGHT / total) ** 0.5), part) for part in local]
+        self._networks = tuple(networks)
+        self._network_factor = np.float32((NETWORK_WEIGHT / total) ** 0.5)
+        self._local = tuple(local)
+        self._local_factor = np.float32((VLAD_WEIGHT / total) ** 0.5)
 
     def describe_pixels(self, pixels: Uint8Array) -> Float32Array:
         """(h, w, 3) uint8 RGB → the networks' share; empty if no part needs pixels."""
-        return _side_by_side([root * part.describe(pixels) for root, part in self._networks])
+        vectors = [part.describe(pixels) for part in self._networks]
+        return self._network_factor * _side_by_side(vectors)
 
-    def describe_local(self, descriptors: Uint8Array) -> Float32Array:
-        """(N, 128) uint8 RootSIFT → VLAD's share; empty if no part needs descriptors."""
-        return _side_by_side([root * part.describe(descriptors) for root, part in self._local])
+    def describe_local(self, features: Features) -> Float32Array:
+        """SIFT features → VLAD's share; empty if no part needs features."""
+        vectors = [part.describe(features) for part in self._local]
+        return self._local_factor * _side_by_side(vectors)
 
-    def join(self, of_pixels: Float32Array, of_descriptors: Float32Array) -> Float32Array:
+    def join(self, of_pixels: Float32Array, of_features: Float32Array) -> Float32Array:
         """Both shares → (dimension,) float32 of length 1."""
         # Not of length 1 already where a photo without features has no VLAD.
-        return unit_length(np.concatenate([of_pixels, of_descriptors]))
+        return unit_length(np.concatenate([of_pixels, of_features]))
 
-    def describe(self, pixels: Uint8Array, descriptors: Uint8Array) -> Float32Array:
+    def describe(self, pixels: Uint8Array, features: Features) -> Float32Array:
         """The whole vector at once."""
-        return self.join(self.describe_pixels(pixels), self.describe_local(descriptors))
+        return self.join(self.describe_pixels(pixels), self.describe_local(features))
 
 
 def resolve(

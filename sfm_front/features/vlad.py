@@ -1,9 +1,9 @@
 """A photo's SIFT descriptors → global vector, without a network: VLAD.
 
 The descriptors are projected and partly whitened, and each goes to its nearest visual word. What
-remains of it after subtracting the word is brought to length 1 and summed with the others of that
-word; each word's sum is brought to length 1 again, so that neither a repeated texture nor a crowded
-word outweighs the rest.
+remains of it after subtracting the word is brought to length 1, weighted by the square root of its
+keypoint's scale, and summed with the others of that word. Each word's sum is brought to length 1
+again, so that neither a repeated texture nor a crowded word outweighs the rest.
 
 Sources: Jegou et al., "Aggregating local image descriptors into compact codes", PAMI 2012;
 Arandjelovic and Zisserman, "All about VLAD", CVPR 2013 (each word's sum at length 1); Delhumeau
@@ -16,11 +16,11 @@ import numpy as np
 
 from sfm_front.features.codebook import Codebook
 from sfm_front.features.vectors import unit_length
-from sfm_front.types import Float32Array, Uint8Array
+from sfm_front.types import Features, Float32Array
 
 
 class Vlad:
-    """Describes photos by their SIFT descriptors. Safe to share between threads."""
+    """Describes photos by their SIFT features. Safe to share between threads."""
 
     name = "vlad"
 
@@ -35,16 +35,18 @@ class Vlad:
         self.dimension = self._words.size
         self.fingerprint = f"{self.name}:{codebook.fingerprint}"
 
-    def describe(self, descriptors: Uint8Array) -> Float32Array:
-        """(N, 128) uint8 RootSIFT → (dimension,) float32 of length 1, or zeros for N = 0."""
-        if len(descriptors) == 0:
+    def describe(self, features: Features) -> Float32Array:
+        """(dimension,) float32 of length 1, or zeros for a photo without features."""
+        if len(features) == 0:
             return np.zeros(self.dimension, np.float32)
-        points = descriptors.astype(np.float32) @ self._projection - self._projected_mean
+        points = features.descriptors.astype(np.float32) @ self._projection - self._projected_mean
         nearness = points @ self._words.T
         # In place: a second array of this size would take as long as the product.
         nearness -= self._half_squares
         nearest = nearness.argmax(axis=1)
         residuals = unit_length(points - self._words[nearest])
+        # Large keypoints are few, and what they show is the scene rather than its texture.
+        residuals *= np.sqrt(features.keypoints[:, 2:3])
         sums = np.zeros_like(self._words)
         # Sorting by word makes each word's rows one run: far faster than np.add.at.
         order = np.argsort(nearest, kind="stable")

@@ -1,0 +1,1 @@
+"""The procedural village that scripts/make_data_samples.py photographs."""
