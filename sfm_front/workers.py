@@ -16,15 +16,17 @@ Result = TypeVar("Result")
 class Workers:
     """Maps a function over items on ``num_threads`` threads; results come in the items' order.
 
-    While it is open, matrix products of this process run on the thread that asks for them: split
-    over all cores, they would have the threads wait for each other.
+    While it is open, matrix products and two-view estimates run on the thread that asks for them:
+    split over all cores, they would have the threads wait for each other.
     """
 
     def __init__(self, num_threads: int) -> None:
         self._pool = (
-            ThreadPoolExecutor(num_threads, "sfm-pairs") if num_threads > 1 else None
+            ThreadPoolExecutor(num_threads, "sfm-pairs", threadpool_limits, (1, "openmp"))
+            if num_threads > 1
+            else None
         )
-        self._one_thread_a_product = threadpool_limits(1, user_api="blas")
+        self._limits = threadpool_limits(1)
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
         if self._pool is None:
@@ -45,4 +47,4 @@ class Workers:
     def close(self) -> None:
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
-        self._one_thread_a_product.restore_original_limits()
+        self._limits.restore_original_limits()

@@ -43,12 +43,15 @@ class Network:
     longer_side_px: int
 
 
+# Sizes: over 369 photos of 14 scenes MobileNetV2 reached mAP 0.858 at 224 px, 0.873 at 320, 0.876
+# at 384, 0.871 at 640, and 0.839 on the usual 224 px crop; joined with VLAD 0.924, 0.927 and 0.930
+# at the first three. ResNet101 costs a CPU core 0.46 s a photo at 320 px: it is shown 224, 0.29 s.
 _MODELS = "https://download.pytorch.org/models"
 
 NETWORKS: Mapping[str, Network] = MappingProxyType(
     {
         "resnet101_pool5": Network(
-            "ResNet101", 2048, f"{_MODELS}/resnet101-63fe2227.pth", longer_side_px=320
+            "ResNet101", 2048, f"{_MODELS}/resnet101-63fe2227.pth", longer_side_px=224
         ),
         "alexnet_fc7": Network(
             "AlexNet", 4096, f"{_MODELS}/alexnet-owt-7be5be79.pth", longer_side_px=320

@@ -193,7 +193,7 @@ class Atlas:
             seen |= group
             if len(group) < self._options.min_model_size:
                 continue
-            started = self._initializer.start(group)
+            started = self._initializer.start(group, last_call=True)
             if started is not None:
                 model, event = started
                 self._events.append(event)

@@ -53,14 +53,17 @@ class Initializer:
         self._mapper_options = mapper_options
         self._tried: set[tuple[int, int, int]] = set()
 
-    def start(self, group: Collection[int]) -> tuple[Model, str] | None:
+    def start(
+        self, group: Collection[int], *, last_call: bool = False
+    ) -> tuple[Model, str] | None:
         """A model of two photos of the group, the strictest demands and strongest pairs first.
 
-        Returns it with a line on how it began, or None when the trials are used up.
+        On the last call no more photos will come, and few may be asked for as little as many.
+        Returns the model with a line on how it began, or None when the trials are used up.
         """
         trials = 0
         for level, relaxation in enumerate(self._options.relaxations):
-            if len(group) < relaxation.min_waiting:
+            if len(group) < relaxation.min_waiting and not last_call:
                 break
             demanded_deg = relaxation.demands.min_angle_deg
             for pair in self._scene.pairs(group):

@@ -1,0 +1,13 @@
+"""Look at a sparse model: python scripts/view.py outputs/NAME/sparse/0 [--screenshot OUT.png]."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from sfm_front.cli import main
+
+if __name__ == "__main__":
+    raise SystemExit(main(["view", *sys.argv[1:]]))

@@ -1,0 +1,76 @@
+"""Run a command and measure it from outside: wall seconds and peak memory."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event, Thread
+from time import perf_counter
+
+from sfm_front.subprocesses import module_environment
+
+_POLL_SECONDS = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """``peak_memory_bytes`` is the resident set of the process without its children; None where
+    the system does not tell (it has no /proc). ``last_line`` is what it printed last."""
+
+    return_code: int
+    wall_seconds: float
+    peak_memory_bytes: int | None
+    last_line: str
+
+
+def measure(command: Sequence[str], log: Path) -> Measured:
+    """Run ``command`` to its end, with standard output and error in the file ``log``."""
+    peak = _Peak()
+    with log.open("wb") as sink:
+        started = perf_counter()
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=sink,
+            stderr=subprocess.STDOUT,
+            env=module_environment(),
+        )
+        ended = Event()
+        watcher = Thread(target=peak.watch, args=(process.pid, ended), daemon=True)
+        watcher.start()
+        try:
+            return_code = process.wait()
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+        finally:
+            ended.set()
+        wall_seconds = perf_counter() - started
+        watcher.join()
+    lines = log.read_text(errors="replace").strip().splitlines()
+    return Measured(return_code, wall_seconds, peak.bytes, lines[-1].strip() if lines else "")
+
+
+class _Peak:
+    """The kernel's own high-water mark, read again and again because it ends with the process.
+
+    ``getrusage`` is no help: a child starts with the peak of the process that forked it.
+    """
+
+    def __init__(self) -> None:
+        self.bytes: int | None = None
+
+    def watch(self, pid: int, ended: Event) -> None:
+        status = Path(f"/proc/{pid}/status")
+        while not ended.is_set():
+            try:
+                text = status.read_text()
+            except OSError:
+                return
+            for line in text.splitlines():
+                if line.startswith("VmHWM:"):
+                    self.bytes = int(line.split()[1]) * 1024
+            ended.wait(_POLL_SECONDS)

@@ -1,0 +1,44 @@
+"""COLMAP models made by hand, for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pycolmap
+
+WIDTH, HEIGHT, FOCAL = 640, 480, 500.0
+
+
+def looking(centre: Sequence[float], towards: Sequence[float], up: Sequence[float]):
+    """cam_from_world of a camera at ``centre`` that looks in the direction ``towards``."""
+    forward = np.array(towards, float) / np.linalg.norm(towards)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    rotation = np.array([right, np.cross(forward, right), forward])
+    return pycolmap.Rigid3d(pycolmap.Rotation3d(rotation), -rotation @ np.array(centre, float))
+
+
+def make_model(
+    cams_from_world: Mapping[str, pycolmap.Rigid3d],
+    points: np.ndarray | None = None,
+    colors: np.ndarray | None = None,
+) -> pycolmap.Reconstruction:
+    """A model of the named photos in their order, all of one camera; nobody sees its points."""
+    model = pycolmap.Reconstruction()
+    camera = pycolmap.Camera(
+        camera_id=1,
+        model="SIMPLE_PINHOLE",
+        width=WIDTH,
+        height=HEIGHT,
+        params=[FOCAL, WIDTH / 2, HEIGHT / 2],
+    )
+    model.add_camera_with_trivial_rig(camera)
+    for image_id, (name, cam_from_world) in enumerate(cams_from_world.items(), start=1):
+        image = pycolmap.Image(name=name, camera_id=1, image_id=image_id)
+        model.add_image_with_trivial_frame(image, cam_from_world)
+    if points is not None:
+        colors = np.full(points.shape, 128) if colors is None else colors
+        for xyz, color in zip(points, colors, strict=True):
+            model.add_point3D(xyz, pycolmap.Track(), color.astype(np.uint8))
+    return model

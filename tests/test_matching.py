@@ -1,0 +1,116 @@
+"""Matching against brute force written out in numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sfm_front.errors import ConfigError
+from sfm_front.evaluation.synthetic import make_scene
+from sfm_front.matching import MatchingOptions, match
+
+
+def brute_force(
+    first: NDArray[np.uint8], second: NDArray[np.uint8], options: MatchingOptions
+) -> NDArray[np.int64]:
+    """(K, 2): the angle of the nearest is small enough, and small beside the second nearest's."""
+    cosine = (first.astype(np.int64) @ second.astype(np.int64).T) / 512.0**2
+    rows = []
+    for i in range(len(first)):
+        best, next_best = np.argsort(-cosine[i], kind="stable")[:2]
+        nearest, next_nearest = np.arccos(np.minimum(cosine[i, [best, next_best]], 1))
+        if (
+            nearest <= options.max_angle_rad
+            and nearest < options.max_ratio * next_nearest
+            and cosine[:, best].argmax() == i
+        ):
+            rows.append((i, best))
+    return np.array(rows, dtype=np.int64).reshape(-1, 2)
+
+
+@pytest.fixture(scope="module")
+def neighbours() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Descriptors of two photos that overlap in part, some of them blurred a good deal."""
+    scene = make_scene(10, 400, seed=3)
+    rng = np.random.default_rng(0)
+    first, second = (scene.photo(index).features.descriptors for index in (4, 5))
+    blur = rng.normal(0, 1, second.shape) * rng.uniform(0, 50, (len(second), 1))
+    blurred = np.maximum(second + blur, 0)
+    blurred *= 512 / np.linalg.norm(blurred, axis=1, keepdims=True)
+    return first, np.minimum(np.rint(blurred), 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        MatchingOptions(),
+        MatchingOptions(max_ratio=0.6),
+        MatchingOptions(max_ratio=1.0),
+        MatchingOptions(max_angle_rad=0.3),
+        MatchingOptions(max_ratio=1.0, max_angle_rad=3.0),
+    ],
+    ids=["default", "strict ratio", "no ratio", "small angle", "mutual only"],
+)
+def test_it_equals_brute_force(neighbours, options):
+    matches = match(*neighbours, options)
+    assert matches.dtype == np.uint32
+    assert len(matches) > 30
+    np.testing.assert_array_equal(matches, brute_force(*neighbours, options))
+
+
+def test_every_test_takes_matches_away(neighbours):
+    """Else equality with brute force would not show that each of them is applied."""
+    counts = [
+        len(match(*neighbours, options))
+        for options in (
+            MatchingOptions(max_ratio=1.0, max_angle_rad=3.0),
+            MatchingOptions(max_ratio=1.0),
+            MatchingOptions(),
+            MatchingOptions(max_angle_rad=0.3),
+        )
+    ]
+    assert counts == sorted(counts, reverse=True)
+    assert len(set(counts)) == len(counts)
+
+
+def test_rows_rise_and_no_keypoint_is_matched_twice(neighbours):
+    matches = match(*neighbours, MatchingOptions(max_ratio=1.0, max_angle_rad=3.0))
+    assert (np.diff(matches[:, 0].astype(int)) > 0).all()
+    assert len(np.unique(matches[:, 1])) == len(matches)
+
+
+def test_two_that_answer_alike_are_ambiguous(neighbours):
+    descriptors = neighbours[0][:50]
+    repeated = np.concatenate([descriptors, descriptors[:10]])
+    matches = match(descriptors, repeated, MatchingOptions())
+    np.testing.assert_array_equal(matches, np.arange(10, 50)[:, None].repeat(2, axis=1))
+
+
+@pytest.mark.parametrize(("count1", "count2"), [(0, 5), (5, 0), (1, 5), (5, 1), (0, 0)])
+def test_too_few_to_compare_give_no_matches(count1, count2):
+    rng = np.random.default_rng(0)
+    first, second = (rng.integers(0, 90, (n, 128), dtype=np.uint8) for n in (count1, count2))
+    assert match(first, second, MatchingOptions()).shape == (0, 2)
+
+
+def test_strangers_do_not_match():
+    first, second = (make_scene(1, 300, seed=seed).photo(0) for seed in (1, 2))
+    matches = match(first.features.descriptors, second.features.descriptors, MatchingOptions())
+    assert len(matches) < 0.02 * len(first.features)
+
+
+def test_a_strided_selection_of_descriptors_is_fine(neighbours):
+    first, second = (np.ascontiguousarray(d[::2]) for d in neighbours)
+    np.testing.assert_array_equal(
+        match(neighbours[0][::2], neighbours[1][::2], MatchingOptions()),
+        match(first, second, MatchingOptions()),
+    )
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"max_ratio": 0.0}, {"max_ratio": 1.1}, {"max_angle_rad": 0.0}]
+)
+def test_values_out_of_range_are_refused_by_name(wrong):
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        MatchingOptions(**wrong)

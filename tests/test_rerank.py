@@ -1,0 +1,96 @@
+"""Re-ranking by verified matches, on photos with known overlap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from photo_stream import no_features, true_matches, view_of
+
+from sfm_front.errors import ConfigError
+from sfm_front.evaluation.synthetic import SyntheticScene, make_scene
+from sfm_front.matching import MatchingOptions
+from sfm_front.retrieval.rerank import Reranker, RerankOptions
+from sfm_front.types import Candidate
+from sfm_front.verification import Verifier, View
+from sfm_front.workers import Workers
+
+QUERY = 0
+OTHERS = (1, 2, 3, 6)
+
+
+@pytest.fixture(scope="module")
+def orbit() -> SyntheticScene:
+    """Photo 1 shares most with photo 0, 2 less, 3 little, 6 looks from the other side."""
+    return make_scene(12, 500, seed=5, layout="orbit")
+
+
+@pytest.fixture(scope="module")
+def views(orbit) -> dict[int, View]:
+    return {index: view_of(orbit, index, index) for index in (QUERY, *OTHERS)}
+
+
+def reranker(max_features: int = 800, num_threads: int = 1) -> Reranker:
+    return Reranker(
+        RerankOptions(max_features=max_features), MatchingOptions(), Verifier(), Workers(num_threads)
+    )
+
+
+def test_the_candidate_that_shares_most_comes_first(orbit, views):
+    # Cosines that say the opposite of the truth.
+    candidates = [Candidate(index, 0.1 * index) for index in reversed(OTHERS)]
+    ranked = reranker().rerank(views[QUERY], candidates, views)
+    shared = {index: len(true_matches(orbit, QUERY, index)) for index in OTHERS}
+    assert shared[1] > shared[2] > shared[3] > shared[6]
+    assert [candidate.image_id for candidate in ranked] == list(OTHERS)
+    assert {c.image_id: c.cosine for c in ranked} == {c.image_id: c.cosine for c in candidates}
+    for candidate in ranked[:2]:
+        assert candidate.inliers == pytest.approx(shared[candidate.image_id], rel=0.1)
+    assert ranked[-1].inliers < 15
+
+
+def test_threads_do_not_change_the_ranking(views):
+    candidates = [Candidate(index, 0.5) for index in OTHERS]
+    alone = reranker().rerank(views[QUERY], candidates, views)
+    workers = Workers(3)
+    together = Reranker(RerankOptions(), MatchingOptions(), Verifier(), workers).rerank(
+        views[QUERY], candidates, views
+    )
+    workers.close()
+    assert together == alone
+
+
+def test_only_the_strongest_features_are_matched(views):
+    candidates = [Candidate(1, 0.5)]
+    (few,) = reranker(max_features=150).rerank(views[QUERY], candidates, views)
+    (many,) = reranker().rerank(views[QUERY], candidates, views)
+    assert 15 < few.inliers <= 150
+    assert few.inliers < many.inliers
+
+
+def test_equals_are_ordered_by_cosine(views):
+    blank = View(20, views[QUERY].camera, no_features())
+    candidates = [Candidate(20, 0.3), Candidate(21, 0.9), Candidate(22, 0.6)]
+    among = dict.fromkeys((20, 21, 22), blank)
+    ranked = reranker().rerank(views[QUERY], candidates, among)
+    assert [(c.image_id, c.inliers) for c in ranked] == [(21, 0), (22, 0), (20, 0)]
+
+
+def test_nothing_to_rank_is_nothing(views):
+    assert reranker().rerank(views[QUERY], [], views) == []
+
+
+def test_too_few_features_for_a_fundamental_matrix_are_refused():
+    with pytest.raises(ConfigError, match="max_features must be at least 8, got 7"):
+        RerankOptions(max_features=7)
+
+
+def test_features_are_matched_by_descriptor_not_by_place(orbit, views):
+    """A photo turned upside down is as relevant as before."""
+    view = views[1]
+    turned = view.features.keypoints.copy()
+    turned[:, :2] = (orbit.camera.width, orbit.camera.height) - turned[:, :2]
+    upside_down = View(1, view.camera, type(view.features)(turned, view.features.descriptors, view.features.colors))
+    (upright,) = reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: view})
+    (flipped,) = reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: upside_down})
+    assert flipped.inliers == pytest.approx(upright.inliers, rel=0.1)
+    assert np.isfinite(flipped.cosine)

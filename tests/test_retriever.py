@@ -1,0 +1,50 @@
+"""Coarse and fine retrieval together, on a flight with known overlaps."""
+
+from __future__ import annotations
+
+import pytest
+from photo_stream import described, true_matches
+
+from sfm_front.errors import ConfigError
+from sfm_front.evaluation.synthetic import make_scene
+from sfm_front.features.vlad import Vlad
+from sfm_front.matching import MatchingOptions
+from sfm_front.retrieval.rerank import Reranker, RerankOptions
+from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
+from sfm_front.verification import Verifier, View
+from sfm_front.workers import Workers
+
+
+def make_retriever(candidates: int) -> Retriever:
+    reranker = Reranker(RerankOptions(), MatchingOptions(), Verifier(), Workers(1))
+    return Retriever(RetrievalOptions(candidates=candidates), Vlad().dimension, reranker)
+
+
+def test_the_most_relevant_photo_is_the_one_that_overlaps_most():
+    scene = make_scene(16, 300, seed=8, layout="orbit")
+    retriever = make_retriever(candidates=6)
+    for index in range(15):
+        photo = described(scene, index)
+        retriever.remember(View(index, scene.camera, photo.features), photo.global_vector)
+    query = described(scene, 15)
+    coarse = retriever.candidates(query.global_vector)
+    assert len(coarse) == 6
+    assert [c.cosine for c in coarse] == sorted((c.cosine for c in coarse), reverse=True)
+    fine = retriever.rerank(View(15, scene.camera, query.features), coarse)
+    assert sorted(c.image_id for c in fine) == sorted(c.image_id for c in coarse)
+    best = max(range(15), key=lambda index: len(true_matches(scene, 15, index)))
+    assert fine[0].image_id == best
+    assert [c.inliers for c in fine] == sorted((c.inliers for c in fine), reverse=True)
+
+
+def test_the_first_photo_has_no_candidates():
+    scene = make_scene(2, 50, seed=9)
+    photo = described(scene, 0)
+    retriever = make_retriever(candidates=5)
+    assert retriever.candidates(photo.global_vector) == []
+    assert retriever.rerank(View(1, scene.camera, photo.features), []) == []
+
+
+def test_no_candidates_asked_for_is_refused():
+    with pytest.raises(ConfigError, match="candidates must be at least 1, got 0"):
+        RetrievalOptions(candidates=0)

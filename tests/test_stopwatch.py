@@ -1,0 +1,38 @@
+"""Seconds by stage, on a clock that the test turns."""
+
+from __future__ import annotations
+
+import pytest
+
+from sfm_front import stopwatch
+from sfm_front.stopwatch import Stopwatch
+
+
+@pytest.fixture
+def turn(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(stopwatch.time, "perf_counter", lambda: now[0])
+
+    def later(seconds: float) -> None:
+        now[0] += seconds
+
+    return later
+
+
+def test_a_stage_entered_twice_adds_up(turn):
+    clock = Stopwatch()
+    for seconds in (2.0, 3.0):
+        with clock.stage("match"):
+            turn(seconds)
+        turn(10.0)
+    with clock.stage("map"):
+        turn(0.5)
+    assert clock.seconds == {"match": 5.0, "map": 0.5}
+
+
+def test_a_stage_that_fails_counts_too(turn):
+    clock = Stopwatch()
+    with pytest.raises(ValueError, match="broken"), clock.stage("map"):
+        turn(4.0)
+        raise ValueError("broken")
+    assert clock.seconds == {"map": 4.0}
