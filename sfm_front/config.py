@@ -8,6 +8,8 @@ from pathlib import Path
 
 from sfm_front.cameras import CameraOptions
 from sfm_front.errors import ConfigError
+from sfm_front.features.sift import SiftExtractor
+from sfm_front.images import PhotoReader
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.matching import MatchingOptions
 from sfm_front.retrieval.rerank import RerankOptions
@@ -51,3 +53,6 @@ class SessionOptions:
             raise ConfigError(f"matched must be at least 1, got {self.matched}")
         if self.threads < 1:
             raise ConfigError(f"threads must be at least 1, got {self.threads}")
+        # These check themselves: here, so that it is done before a session has written anything.
+        PhotoReader(max_image_size=self.max_image_size)
+        SiftExtractor(self.max_features)

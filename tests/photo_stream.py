@@ -50,9 +50,7 @@ def true_matches(scene: SyntheticScene, first: int, second: int) -> np.ndarray:
     return np.column_stack([shown[0][in_first], shown[1][in_second]]).astype(np.uint32)
 
 
-def true_pair(
-    scene: SyntheticScene, first: int, second: int, ids: tuple[int, int]
-) -> PairGeometry:
+def true_pair(scene: SyntheticScene, first: int, second: int, ids: tuple[int, int]) -> PairGeometry:
     """The pair as verification finds it where nothing goes wrong."""
     matches = true_matches(scene, first, second)
     poses = [scene.cams_from_world[index] for index in (first, second)]

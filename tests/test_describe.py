@@ -1,4 +1,4 @@
-"""Describing photos ahead: order, bounds, bad files, and the same result on any number of threads."""
+"""Describing photos ahead: order, bounds, bad files, and the same on any number of threads."""
 
 from __future__ import annotations
 

@@ -108,9 +108,7 @@ def test_a_strided_selection_of_descriptors_is_fine(neighbours):
     )
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"max_ratio": 0.0}, {"max_ratio": 1.1}, {"max_angle_rad": 0.0}]
-)
+@pytest.mark.parametrize("wrong", [{"max_ratio": 0.0}, {"max_ratio": 1.1}, {"max_angle_rad": 0.0}])
 def test_values_out_of_range_are_refused_by_name(wrong):
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         MatchingOptions(**wrong)

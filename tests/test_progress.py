@@ -72,7 +72,7 @@ def test_on_a_terminal_one_line_renews_itself(turn, monkeypatch):
     assert all(len(text) < 40 for text in shown)
 
 
-def test_a_note_on_a_terminal_stays(turn):
+def test_a_note_on_a_terminal_stays():
     stream = Terminal()
     line = ProgressLine(2, stream)
     line.show(placed("a.jpg", 0, 0))

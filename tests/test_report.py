@@ -70,16 +70,15 @@ def finish(report: Report, output: Path) -> dict:
     )
 
 
-def test_a_line_of_retrieval_for_each_photo_that_is_used(report, tmp_path):
+@pytest.mark.usefixtures("report")
+def test_a_line_of_retrieval_for_each_photo_that_is_used(tmp_path):
     lines = (tmp_path / "retrieval.jsonl").read_text(encoding="utf-8").splitlines()
     assert [json.loads(line) for line in lines] == [
         {"name": "ä 1.jpg", "most_relevant": None, "candidates": []},
         {
             "name": "b.jpg",
             "most_relevant": "ä 1.jpg",
-            "candidates": [
-                {"name": "ä 1.jpg", "cosine": 0.12346, "inliers": 40, "verified": True}
-            ],
+            "candidates": [{"name": "ä 1.jpg", "cosine": 0.12346, "inliers": 40, "verified": True}],
         },
         {
             "name": "c.jpg",

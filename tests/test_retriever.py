@@ -15,14 +15,16 @@ from sfm_front.verification import Verifier, View
 from sfm_front.workers import Workers
 
 
-def make_retriever(candidates: int) -> Retriever:
-    reranker = Reranker(RerankOptions(), MatchingOptions(), Verifier(), Workers(1))
-    return Retriever(RetrievalOptions(candidates=candidates), Vlad().dimension, reranker)
+@pytest.fixture
+def retriever():
+    """It asks for six candidates."""
+    with Workers(1) as workers:
+        reranker = Reranker(RerankOptions(), MatchingOptions(), Verifier(), workers)
+        yield Retriever(RetrievalOptions(candidates=6), Vlad().dimension, reranker)
 
 
-def test_the_most_relevant_photo_is_the_one_that_overlaps_most():
+def test_the_most_relevant_photo_is_the_one_that_overlaps_most(retriever):
     scene = make_scene(16, 300, seed=8, layout="orbit")
-    retriever = make_retriever(candidates=6)
     for index in range(15):
         photo = described(scene, index)
         retriever.remember(View(index, scene.camera, photo.features), photo.global_vector)
@@ -37,10 +39,9 @@ def test_the_most_relevant_photo_is_the_one_that_overlaps_most():
     assert [c.inliers for c in fine] == sorted((c.inliers for c in fine), reverse=True)
 
 
-def test_the_first_photo_has_no_candidates():
+def test_the_first_photo_has_no_candidates(retriever):
     scene = make_scene(2, 50, seed=9)
     photo = described(scene, 0)
-    retriever = make_retriever(candidates=5)
     assert retriever.candidates(photo.global_vector) == []
     assert retriever.rerank(View(1, scene.camera, photo.features), []) == []
 

@@ -67,7 +67,7 @@ def test_a_mapper_knows_the_photos_there_are(feed):
     assert model.images[2].num_points2D() == len(feed.synthetic.photo(1).features)
 
 
-def test_a_mapper_can_be_told_of_later_photos(orbit, feed):
+def test_a_mapper_can_be_told_of_later_photos(feed):
     mapper, model = feed.scene.new_mapper()
     image_id = feed.add(4)
     feed.scene.extend(mapper, model, image_id)

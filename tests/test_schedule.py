@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from sfm_front.errors import ConfigError
@@ -41,7 +43,7 @@ def test_a_small_model_is_refined_often_and_a_large_one_seldom():
 
 def test_no_model_waits_longer_than_its_growth_allows():
     sizes = [2, *refinements(1000, growth=1.25)]
-    for earlier, later in zip(sizes, sizes[1:], strict=False):
+    for earlier, later in pairwise(sizes):
         assert later < 1.25 * earlier + 1
 
 

@@ -31,9 +31,7 @@ BLOBS = np.array(
 def blobs(width: int, height: int, centres: NDArray[np.float64], sigma: float) -> NDArray[np.uint8]:
     """(height, width, 3) uint8: bright Gaussian blobs on grey."""
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    light = sum(
-        np.exp(-((x - cx) ** 2 + (y - cy) ** 2) / (2 * sigma**2)) for cx, cy in centres
-    )
+    light = sum(np.exp(-((x - cx) ** 2 + (y - cy) ** 2) / (2 * sigma**2)) for cx, cy in centres)
     return np.repeat(np.rint(60 + 180 * light).astype(np.uint8)[..., None], 3, axis=2)
 
 
@@ -43,7 +41,8 @@ def texture(width: int = 320, height: int = 240, seed: int = 0) -> NDArray[np.ui
     total = np.zeros((height, width, 3))
     for cells in (8, 20, 50):
         coarse = rng.integers(0, 256, (cells, cells, 3), dtype=np.uint8)
-        total += np.asarray(Image.fromarray(coarse).resize((width, height), Image.Resampling.BICUBIC))
+        octave = Image.fromarray(coarse).resize((width, height), Image.Resampling.BICUBIC)
+        total += np.asarray(octave)
     return (total / 3).astype(np.uint8)
 
 

@@ -30,9 +30,8 @@ def orbit() -> SyntheticScene:
 def database(orbit, tmp_path):
     """Three photos: 1 and 2 of one camera, 3 with a position and of another; pairs 2-1 and 3-1."""
     file = tmp_path / "database.db"
-    other = pycolmap.Camera(
-        camera_id=5, model="OPENCV", width=400, height=300, params=[300, 310, 200, 150, 0.1, 0, 0, 0]
-    )
+    params = [300, 310, 200, 150, 0.1, 0, 0, 0]
+    other = pycolmap.Camera(camera_id=5, model="OPENCV", width=400, height=300, params=params)
     other.has_prior_focal_length = True
     position = GeoPosition(47.5, -8.25, 512.0)
     with Store(file) as store:

@@ -69,9 +69,7 @@ def make_pair(
         x, y = rng.uniform(-0.55, 0.55), rng.uniform(-0.4, 0.4)
         depth = 8 / (1 - 0.6 * x) if flat else rng.uniform(6, 14)
         point = depth * np.array([x, y, 1.0])
-        xy1, xy2 = (
-            camera.img_from_cam(p[None])[0] for p in (point, cam2_from_cam1 * point)
-        )
+        xy1, xy2 = (camera.img_from_cam(p[None])[0] for p in (point, cam2_from_cam1 * point))
         if all(0 < v[0] < WIDTH and 0 < v[1] < HEIGHT for v in (xy1, xy2)):
             found1.append(xy1 + rng.normal(0, NOISE_PX, 2))
             found2.append(xy2 + rng.normal(0, NOISE_PX, 2))
@@ -119,9 +117,7 @@ def assert_pose_is_true(pair: Pair, found: pycolmap.Rigid3d) -> None:
     assert np.degrees(np.arccos(np.clip(directions[0] @ directions[1], -1, 1))) < DIRECTION_DEG
 
 
-@pytest.mark.parametrize(
-    ("num_true", "num_false"), [(60, 0), (200, 60), (200, 200), (900, 300)]
-)
+@pytest.mark.parametrize(("num_true", "num_false"), [(60, 0), (200, 60), (200, 200), (900, 300)])
 def test_the_true_matches_and_the_true_pose_are_found(num_true, num_false):
     pair = make_pair(num_true, num_false)
     result = verified(pair)
@@ -157,7 +153,8 @@ def test_a_plane_is_verified():
 def test_a_camera_that_only_turned_is_verified():
     pair = make_pair(200, 60, turn_only=True)
     result = verified(pair)
-    assert result.two_view_geometry.config in (CONFIGURATION.PANORAMIC, CONFIGURATION.PLANAR_OR_PANORAMIC)
+    turned = CONFIGURATION.PANORAMIC, CONFIGURATION.PLANAR_OR_PANORAMIC
+    assert result.two_view_geometry.config in turned
     assert accepted(pair, result)[pair.is_true].mean() > RECALL
 
 
@@ -209,6 +206,13 @@ def test_a_sample_serves_as_well_as_all():
     assert_inliers_are_the_true_matches(pair, sampled)
     assert_inliers_are_the_true_matches(pair, full)
     assert_pose_is_true(pair, sampled.two_view_geometry.cam2_from_cam1)
+
+
+def test_the_essential_matrix_brings_back_what_the_gate_lost(monkeypatch):
+    pair = make_pair(400, 100, seed=6)
+    half = pair.is_true & (np.arange(500) % 2 == 0)
+    monkeypatch.setattr(Verifier, "_gate", lambda *_: half)
+    assert_inliers_are_the_true_matches(pair, verified(pair))
 
 
 def test_count_inliers_counts_the_true_matches():
