@@ -73,7 +73,7 @@ class PhotoDescriber:
         source = iter(photos)
         # Whole photos side by side use the cores better than OpenCV's splitting of each.
         threads_before = cv2.getNumThreads()
-        cv2.setNumThreads(1 if self._num_threads > 1 else threads_before)
+        cv2.setNumThreads(1)
         ahead: deque[Future[DescribedPhoto | Skipped]] = deque()
         try:
             while True:

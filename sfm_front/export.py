@@ -23,7 +23,8 @@ def export_models(
 
     ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form.
     Everything is written beside ``folder`` first and then moved into place, so that a crash
-    leaves either the models that were there or the new ones, never a part.
+    leaves either the models that were there or the new ones, never a part. Where it happens
+    between the two moves, the models that were there are in ``folder.old``.
     """
     fresh = folder.with_name(folder.name + ".new")
     shutil.rmtree(fresh, ignore_errors=True)
@@ -53,8 +54,8 @@ def export_models(
 
 def _replace(folder: Path, fresh: Path) -> None:
     old = folder.with_name(folder.name + ".old")
-    shutil.rmtree(old, ignore_errors=True)
     if folder.exists():
+        shutil.rmtree(old, ignore_errors=True)
         folder.rename(old)
     fresh.rename(folder)
     shutil.rmtree(old, ignore_errors=True)

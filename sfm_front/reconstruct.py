@@ -7,7 +7,6 @@ and it is placed in a model before the next one is taken.
 from __future__ import annotations
 
 import argparse
-import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -16,14 +15,12 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from sfm_front.errors import ConfigError, InputError
+from sfm_front.errors import ConfigError
 from sfm_front.progress import ProgressLine, closing_summary
 from sfm_front.source import list_photos, order_photos
 
 if TYPE_CHECKING:
     from sfm_front.config import SessionOptions
-
-_OUTPUTS = ("database.db", "database.db-shm", "database.db-wal", "retrieval.jsonl", "report.json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,9 +87,10 @@ def run(arguments: argparse.Namespace) -> int:
     from sfm_front.session import Session
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
-    if arguments.overwrite:
-        _clear(output)
-    with Session(output, options) as session, _interruptible() as interrupted:
+    with (
+        Session(output, options, overwrite=arguments.overwrite) as session,
+        _interruptible() as interrupted,
+    ):
         if session.message:
             print(session.message)
         progress = ProgressLine(len(photos), sys.stdout)
@@ -156,17 +154,6 @@ def _numbers(text: str | None) -> tuple[float, ...] | None:
         raise ConfigError(
             f"--camera-params takes numbers separated by commas, got {text!r}"
         ) from None
-
-
-def _clear(output: Path) -> None:
-    """Remove what an earlier session wrote, and nothing else."""
-    if not output.exists():
-        return
-    if not output.is_dir():
-        raise InputError(f"{output}: not a folder. Give another --output.")
-    for name in _OUTPUTS:
-        (output / name).unlink(missing_ok=True)
-    shutil.rmtree(output / "sparse", ignore_errors=True)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -36,6 +37,8 @@ from sfm_front.types import (
 from sfm_front.verification import Verifier, View
 from sfm_front.workers import Workers
 
+_OUTPUTS = ("database.db", "database.db-shm", "database.db-wal", "retrieval.jsonl", "report.json")
+
 
 class Session:
     """Reconstructs photos that arrive one at a time.
@@ -50,12 +53,21 @@ class Session:
     ``output`` receives ``database.db``, ``retrieval.jsonl``, ``report.json`` and ``sparse/``.
     """
 
-    def __init__(self, output: Path, options: SessionOptions | None = None) -> None:
-        """Raises InputError if ``output`` already holds a session's database."""
+    def __init__(
+        self, output: Path, options: SessionOptions | None = None, *, overwrite: bool = False
+    ) -> None:
+        """``overwrite`` removes what an earlier session wrote to ``output``, and nothing else.
+
+        Raises InputError if there is such a session and it may not be overwritten; ConfigError,
+        WeightsError or DependencyError if the global descriptor cannot be had. Nothing has been
+        written or removed then.
+        """
         self.options = options or SessionOptions()
         self.output = output
         database = output / "database.db"
-        if database.exists():
+        if output.exists() and not output.is_dir():
+            raise InputError(f"{output}: not a folder. Give another --output.")
+        if database.exists() and not overwrite:
             raise InputError(
                 f"{output}: holds a reconstruction already. Give another --output, "
                 "or --overwrite to replace it."
@@ -65,6 +77,8 @@ class Session:
             weights=self.options.weights,
             device=self.options.device,
         )
+        if overwrite:
+            _clear(output)
         output.mkdir(parents=True, exist_ok=True)
         threads = self.options.threads
         self._describer = PhotoDescriber(
@@ -198,3 +212,10 @@ class Session:
         with clock.stage("verify"):
             verified = self._workers.map(verify_with, zip(others, matches, strict=True))
         return [pair for pair in verified if isinstance(pair, PairGeometry)]
+
+
+def _clear(output: Path) -> None:
+    for name in _OUTPUTS:
+        (output / name).unlink(missing_ok=True)
+    for folder in output.glob("sparse*"):
+        shutil.rmtree(folder, ignore_errors=True)

@@ -90,7 +90,7 @@ class Photo:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """What is remembered of a photo's content, strongest keypoint first.
+    """What is remembered of a photo's content, keypoint of largest scale first.
 
     ``keypoints`` (N, 4) float32: x, y, scale, orientation (radians), in pixels of the file, the
     top-left pixel centred at (0.5, 0.5) as in COLMAP. ``descriptors`` (N, 128) uint8: RootSIFT

@@ -4,30 +4,40 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.types import Features, Float32Array, Photo, Uint8Array
 
 DESCRIPTOR_SCALE = 512.0
+# How many keypoints, by response, are described for each one that is kept by scale.
+_DESCRIBED_PER_KEPT = 4
 
 
 class SiftExtractor:
-    """Finds the strongest SIFT keypoints of a photo. Safe to share between threads."""
+    """Finds the SIFT keypoints of a photo. Safe to share between threads.
+
+    The keypoints of largest scale are kept, as in COLMAP: they are found again from other
+    distances, where those of strongest response are mostly of the finest scale. On
+    ``sceaux_castle`` it made 87 to 271 inliers of 0 to 24 between the last photo, a zoom, and
+    three of those before it.
+    """
 
     def __init__(self, max_features: int = 4000) -> None:
-        """``max_features``: keypoints kept a photo, the ones of strongest response.
-
-        Raises ConfigError if it is below 1.
+        """``max_features``: places kept a photo; one with several orientations counts once, as
+        in COLMAP. Raises ConfigError if it is below 1.
         """
         if max_features < 1:
             raise ConfigError(f"max_features must be at least 1, got {max_features}")
         self.max_features = max_features
 
     def extract(self, photo: Photo) -> Features:
-        """Keypoints in pixels of the file, strongest first; none in a photo without texture."""
+        """Keypoints in pixels of the file, largest first; none in a photo without texture."""
         gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
         # A detector for each call: OpenCV does not promise that one may be shared by threads.
-        detector = cv2.SIFT.create(nfeatures=self.max_features, enable_precise_upscale=True)
+        detector = cv2.SIFT.create(
+            nfeatures=_DESCRIBED_PER_KEPT * self.max_features, enable_precise_upscale=True
+        )
         found, raw = detector.detectAndCompute(gray, None)
         if not found or raw is None:
             return Features(
@@ -35,15 +45,25 @@ class SiftExtractor:
                 np.zeros((0, 128), np.uint8),
                 np.zeros((0, 3), np.uint8),
             )
-        # OpenCV keeps every keypoint that ties with the last one: cut after sorting.
+        working = np.array([(*k.pt, k.size, k.angle) for k in found], np.float32)
         response = np.array([k.response for k in found], np.float32)
-        order = np.argsort(-response, kind="stable")[: self.max_features]
-        working = np.array([(*k.pt, k.size, k.angle) for k in found], np.float32)[order]
+        kept = _largest(working, response, self.max_features)
+        working = working[kept]
         return Features(
             _to_file_pixels(working, photo),
-            root_sift(np.asarray(raw, np.float32)[order]),
+            root_sift(np.asarray(raw, np.float32)[kept]),
             _colors_at(photo.pixels, working[:, :2]),
         )
+
+
+def _largest(working: Float32Array, response: Float32Array, count: int) -> NDArray[np.intp]:
+    """Indices of the keypoints at the ``count`` places of largest scale, then response."""
+    order = np.lexsort((-response, -working[:, 2]))
+    places = working[order, :3]
+    is_new = np.ones(len(order), np.bool_)
+    is_new[1:] = np.any(places[1:] != places[:-1], axis=1)
+    kept: NDArray[np.intp] = order[np.cumsum(is_new) <= count]
+    return kept
 
 
 def root_sift(raw: Float32Array) -> Uint8Array:

@@ -105,7 +105,7 @@ class Atlas:
                 self._events.append(f"{len(placed)} photos registered without structure")
         self._settle()
         for model in self.models:
-            model.refine()
+            model.finish()
 
     def _grow(self) -> bool:
         """Grow every model, the largest first; True if any grew."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import pycolmap
 
 from sfm_front.errors import ConfigError
+from sfm_front.mapping.polish import PolishOptions, polish
 from sfm_front.mapping.scene import Scene
 from sfm_front.mapping.schedule import RefinementSchedule, ScheduleOptions
 
@@ -179,6 +180,17 @@ class Model:
     def refine(self) -> None:
         """Bundle-adjust the whole model, complete and merge tracks, drop what does not fit."""
         self._refine(self._final)
+
+    def finish(self) -> None:
+        """Refine a last time. The model cannot grow any more after this."""
+        self.refine()
+        self.reconstruction = polish(
+            self.reconstruction,
+            PolishOptions(
+                refine_intrinsics=self._options.refine_intrinsics,
+                num_threads=self._options.num_threads,
+            ),
+        )
 
     def forget_failures(self) -> None:
         """Let every waiting photo be tried again."""
