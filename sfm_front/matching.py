@@ -17,7 +17,7 @@ NO_MATCHES: Uint32Array = np.zeros((0, 2), np.uint32)
 
 @dataclass(frozen=True, kw_only=True)
 class MatchingOptions:
-    """COLMAP's tests on the angle between descriptors.
+    """COLMAP's tests on the angle between descriptors, the ratio one in one direction only.
 
     ``max_ratio``: the nearest neighbour's angle over the second nearest's.
     ``max_angle_rad``: the largest angle of a match.

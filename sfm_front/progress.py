@@ -82,6 +82,12 @@ def closing_summary(report: dict[str, Any], output: Path) -> str:
         f"seconds a photo: {totals['wall_seconds'] / photos:.2f} in all; by stage, "
         f"side by side in part: {stages}"
     )
+    by_quarter = totals["median_seconds_by_quarter"]
+    if len(by_quarter) == 4:
+        lines.append(
+            "work on a photo, global refinement apart, median by quarter of the run: "
+            + ", ".join(f"{seconds:.2f} s" for seconds in by_quarter)
+        )
     lines += _reasons(
         "skipped",
         [

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import resource
+import statistics
 import sys
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -143,8 +145,24 @@ class Report:
             "mean_reprojection_error_px": round(error / points, 4) if points else None,
             "wall_seconds": round(time.perf_counter() - self._started, 3),
             "seconds_by_stage": _rounded(by_stage),
+            "median_seconds_by_quarter": self._median_seconds_by_quarter(),
             "peak_memory_bytes": _peak_memory_bytes(),
         }
+
+    def _median_seconds_by_quarter(self) -> list[float]:
+        """Work on a photo by its quarter of the session, global refinement apart: it should not
+        grow once there are as many photos as candidates."""
+        work = [
+            sum(seconds for stage, seconds in step.seconds.items() if stage != "refine")
+            for step in self._steps
+            if step.image_id is not None
+        ]
+        bounds = [len(work) * quarter // 4 for quarter in range(5)]
+        return [
+            round(statistics.median(work[start:end]), 4)
+            for start, end in pairwise(bounds)
+            if end > start
+        ]
 
 
 def _rounded(seconds: Mapping[str, float]) -> dict[str, float]:

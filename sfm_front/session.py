@@ -176,6 +176,8 @@ class Session:
         with clock.stage("map"):
             self._scene.add(image_id, photo.name, camera, photo.features.keypoints, pairs)
             registered = self._atlas.add(image_id)
+        # Apart from the rest of mapping: it alone depends on how many photos came before.
+        clock.move("map", "refine", self._atlas.take_refinement_seconds())
         self._retriever.remember(view, photo.global_vector)
         self._views[image_id] = view
         self._names[image_id] = photo.name

@@ -21,3 +21,8 @@ class Stopwatch:
         finally:
             elapsed = time.perf_counter() - started
             self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
+
+    def move(self, whole: str, part: str, seconds: float) -> None:
+        """Count seconds that were spent within the stage ``whole`` as the stage ``part``."""
+        self.seconds[whole] -= seconds
+        self.seconds[part] = self.seconds.get(part, 0.0) + seconds

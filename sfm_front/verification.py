@@ -25,7 +25,7 @@ class VerificationOptions:
     ``min_inliers``: fewest inliers of a two-view geometry.
     ``max_gate_trials``: samples of the fundamental-matrix gate.
     ``model_sample``: inliers on which the two-view model is estimated; all are then counted.
-    ``seed``: of every random sample.
+    ``seed``: of the model's samples; the gate draws the same samples always.
     """
 
     max_error_px: float = 4.0

@@ -41,3 +41,12 @@ def test_a_stage_that_fails_counts_too(turn):
     with pytest.raises(ValueError, match="broken"):
         fail()
     assert clock.seconds == {"map": 4.0}
+
+
+def test_a_part_of_a_stage_is_counted_apart(turn):
+    clock = Stopwatch()
+    with clock.stage("map"):
+        turn(3.0)
+    clock.move("map", "refine", 1.0)
+    clock.move("map", "refine", 0.5)
+    assert clock.seconds == {"map": 1.5, "refine": 1.5}

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.mapper import MapperOptions, Model
 from sfm_front.mapping.scene import Scene
+from sfm_front.stopwatch import Stopwatch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,8 +44,9 @@ class Atlas:
     def __init__(self, scene: Scene, options: AtlasOptions | None = None) -> None:
         self._scene = scene
         self._options = options or AtlasOptions()
+        self._clock = Stopwatch()
         self._initializer = Initializer(
-            scene, self._options.initialization, self._options.mapper
+            scene, self._options.initialization, self._options.mapper, self._clock
         )
         self._events: list[str] = []
         self.models: list[Model] = []
@@ -74,6 +76,10 @@ class Atlas:
             return "verified matches only with photos that are not registered"
         seen = max(model.num_visible_points(image_id) for model in self.models)
         return f"no pose fits the {seen} model points it sees"
+
+    def take_refinement_seconds(self) -> float:
+        """Wall seconds that global refinements took since the last call."""
+        return self._clock.seconds.pop("refine", 0.0)
 
     def take_events(self) -> tuple[str, ...]:
         """What was started, relaxed, restarted or joined since the last call."""

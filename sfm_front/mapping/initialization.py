@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sfm_front.mapping.mapper import InitialPairDemands, MapperOptions, Model
 from sfm_front.mapping.scene import Scene
+from sfm_front.stopwatch import Stopwatch
 
 _ANGLE_TOLERANCE = 0.7
 
@@ -46,9 +47,14 @@ class Initializer:
     """Starts models. A pair is tried once at each relaxation."""
 
     def __init__(
-        self, scene: Scene, options: InitializationOptions, mapper_options: MapperOptions
+        self,
+        scene: Scene,
+        options: InitializationOptions,
+        mapper_options: MapperOptions,
+        clock: Stopwatch,
     ) -> None:
         self._scene = scene
+        self._clock = clock
         self._options = options
         self._mapper_options = mapper_options
         self._tried: set[tuple[int, int, int]] = set()
@@ -76,7 +82,7 @@ class Initializer:
                     return None
                 self._tried.add((*pair, level))
                 trials += 1
-                model = Model(self._scene, self._mapper_options)
+                model = Model(self._scene, self._mapper_options, self._clock)
                 if model.initialize(*pair, relaxation.demands):
                     return model, _describe(pair, relaxation.demands)
         return None
@@ -84,12 +90,12 @@ class Initializer:
     def best_starts(self, per_relaxation: int) -> Iterator[tuple[Model, str]]:
         """Models of two photos from the pairs that COLMAP finds best in the whole scene."""
         for relaxation in self._options.relaxations:
-            finder = Model(self._scene, self._mapper_options)
+            finder = Model(self._scene, self._mapper_options, self._clock)
             for _ in range(per_relaxation):
                 pair = finder.find_initial_pair(relaxation.demands)
                 if pair is None:
                     break
-                model = Model(self._scene, self._mapper_options)
+                model = Model(self._scene, self._mapper_options, self._clock)
                 if model.initialize(*pair, relaxation.demands):
                     yield model, _describe(pair, relaxation.demands)
 

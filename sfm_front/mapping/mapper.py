@@ -11,6 +11,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.mapping.polish import PolishOptions, polish
 from sfm_front.mapping.scene import Scene
 from sfm_front.mapping.schedule import RefinementSchedule, ScheduleOptions
+from sfm_front.stopwatch import Stopwatch
 
 # Trial counts are kept here, by what a photo sees, not by pycolmap.
 _UNLIMITED_TRIALS = 1_000_000
@@ -83,9 +84,13 @@ class MapperOptions:
 class Model:
     """A model that grows photo by photo over a shared scene."""
 
-    def __init__(self, scene: Scene, options: MapperOptions) -> None:
+    def __init__(
+        self, scene: Scene, options: MapperOptions, clock: Stopwatch | None = None
+    ) -> None:
+        """``clock`` counts global refinements as the stage ``refine``."""
         self._scene = scene
         self._options = options
+        self._clock = clock or Stopwatch()
         self._streaming = options.streaming()
         self._final = options.final()
         self._mapping = self._streaming.get_mapper()
@@ -236,17 +241,18 @@ class Model:
         self._mapper.clear_modified_points3D()
 
     def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
-        # pycolmap does not count a later photo's correspondences to registered ones; taking a
-        # photo out would then fail. Beginning again over the same model counts afresh.
-        self._mapper.end_reconstruction(False)
-        self._mapper.begin_reconstruction(self.reconstruction)
-        self._mapper.iterative_global_refinement(
-            pipeline.ba_global_max_refinements,
-            pipeline.ba_global_max_refinement_change,
-            self._mapping,
-            pipeline.get_global_bundle_adjustment(),
-            self._triangulation,
-        )
+        with self._clock.stage("refine"):
+            # pycolmap does not count a later photo's correspondences to registered ones; taking a
+            # photo out would then fail. Beginning again over the same model counts afresh.
+            self._mapper.end_reconstruction(False)
+            self._mapper.begin_reconstruction(self.reconstruction)
+            self._mapper.iterative_global_refinement(
+                pipeline.ba_global_max_refinements,
+                pipeline.ba_global_max_refinement_change,
+                self._mapping,
+                pipeline.get_global_bundle_adjustment(),
+                self._triangulation,
+            )
         self._note_refined()
 
     def _note_refined(self) -> None:

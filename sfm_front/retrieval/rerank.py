@@ -14,7 +14,7 @@ from sfm_front.workers import Workers
 
 @dataclass(frozen=True, kw_only=True)
 class RerankOptions:
-    """``max_features``: strongest features of each photo that are matched."""
+    """``max_features``: features of each photo, those of largest scale, that are matched."""
 
     max_features: int = 800
 
