@@ -65,7 +65,12 @@ def _adjust(
     adjustment.ceres.loss_function_scale = options.loss_scale_px
     adjustment.ceres.solver_options.function_tolerance = 1e-4
     adjustment.ceres.solver_options.num_threads = options.num_threads
-    pycolmap.bundle_adjustment(reconstruction, adjustment)
+    config = pycolmap.BundleAdjustmentConfig()
+    for image_id in reconstruction.reg_image_ids():
+        config.add_image(image_id)
+    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    # pycolmap.bundle_adjustment does this too, and prints about it whatever the log level.
+    pycolmap.create_default_bundle_adjuster(adjustment, config, reconstruction).solve()
     reconstruction.update_point_3d_errors()
 
 
