@@ -113,6 +113,7 @@ def content(photos: list[dict[str, object]], models: int = 1) -> dict[str, objec
             "models": models,
             "wall_seconds": 65.0,
             "seconds_by_stage": {"sift": 4.0, "map": 2.0},
+            "median_seconds_by_quarter": [1.0, 2.0, 2.5, 2.25],
         },
     }
 
@@ -129,6 +130,8 @@ def test_the_summary_says_what_became_of_all():
         "2 of 5 photos registered in 1 model, 1:05",
         f"  {Path('out/sparse/0')}: 2 photos, 1234 points, 0.43 px",
         "seconds a photo: 13.00 in all; by stage, side by side in part: sift 0.800, map 0.400",
+        "work on a photo, global refinement apart, median by quarter of the run: "
+        "1.00 s, 2.00 s, 2.50 s, 2.25 s",
         "skipped:",
         "  d.jpg: empty file",
         "  e.jpg: too small: 20 x 20",
