@@ -16,7 +16,7 @@ class AtlasOptions:
 
     ``min_second_model``: photos that must wait, linked to each other, before a further model is
     started. ``min_model_size``: photos of its own that a further model must have to be kept.
-    ``min_link``: inliers of a pair that should have brought a photo into a model.
+    ``max_missed_share``: of linked photos that may be in no model without a fresh start.
     ``min_share``: of the photos linked to a model that it should hold itself.
     ``fresh_starts``: how many starts of each relaxation the end of a session may try.
     ``max_failures``: fresh starts that may grow far and be no better before it gives up.
@@ -24,7 +24,7 @@ class AtlasOptions:
 
     min_second_model: int = 4
     min_model_size: int = 3
-    min_link: int = 45
+    max_missed_share: float = 0.02
     min_share: float = 0.75
     fresh_starts: int = 2
     max_failures: int = 1
@@ -105,11 +105,8 @@ class Atlas:
         self._start_afresh()
         self._start_leftovers()
         self._drop_small()
-        for model in self.models:
-            placed = model.grow_without_structure(self.waiting)
-            if placed:
-                self._events.append(f"{len(placed)} photos registered without structure")
-        self._settle()
+        while self._place_without_structure():
+            self._settle()
         for model in self.models:
             model.finish()
 
@@ -161,7 +158,7 @@ class Atlas:
                 model.forget_failures()
 
     def _start_afresh(self) -> None:
-        """Where the largest model misses photos well linked to it, grow it anew.
+        """Where the largest model misses photos linked to it, grow it anew.
 
         The stream had to take the first pair that would do; the whole graph offers better ones.
         The better of old and new stays.
@@ -183,9 +180,9 @@ class Atlas:
                     return
 
     def _misses(self, model: Model) -> bool:
-        """Whether photos well linked to a model are in none, or too many in others."""
-        linked = self._scene.component(model.registered, min_inliers=self._options.min_link)
-        if linked - self.registered:
+        """Whether photos linked to a model are in none, or too many in others."""
+        linked = self._scene.component(model.registered)
+        if len(linked - self.registered) > self._options.max_missed_share * len(linked):
             return True
         return model.num_registered < self._options.min_share * len(linked)
 
@@ -205,6 +202,13 @@ class Atlas:
                 self._events.append(event)
                 self.models.append(model)
                 self._settle()
+
+    def _place_without_structure(self) -> bool:
+        """Register by two-view geometry alone what sees too few points; True if any was."""
+        placed = [i for model in self.models for i in model.grow_without_structure(self.waiting)]
+        if placed:
+            self._events.append(f"{len(placed)} photos registered without structure")
+        return bool(placed)
 
     def _drop_small(self) -> None:
         covered: set[int] = set()

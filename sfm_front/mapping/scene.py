@@ -82,19 +82,17 @@ class Scene:
         return math.degrees(self._angles_rad[pair])
 
     def component(
-        self, start: Iterable[int], *, among: Collection[int] | None = None, min_inliers: int = 0
+        self, start: Iterable[int], *, among: Collection[int] | None = None
     ) -> set[int]:
         """Photos linked to the given ones by chains of verified pairs, these included.
 
-        ``among`` limits the chains to these photos, ``min_inliers`` to strong pairs.
+        ``among`` limits the chains to these photos.
         """
         found = set(start)
         frontier = list(found)
         while frontier:
-            for neighbor, inliers in self._neighbors[frontier.pop()].items():
-                if neighbor in found or inliers < min_inliers:
-                    continue
-                if among is None or neighbor in among:
+            for neighbor in self._neighbors[frontier.pop()]:
+                if neighbor not in found and (among is None or neighbor in among):
                     found.add(neighbor)
                     frontier.append(neighbor)
         return found
