@@ -61,9 +61,7 @@ def _replace(folder: Path, fresh: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def _color(
-    reconstruction: pycolmap.Reconstruction, colors: Mapping[int, Uint8Array]
-) -> None:
+def _color(reconstruction: pycolmap.Reconstruction, colors: Mapping[int, Uint8Array]) -> None:
     """Give each point the mean colour of the keypoints in its track."""
     for point in reconstruction.points3D.values():
         seen = [colors[e.image_id][e.point2D_idx] for e in point.track.elements]

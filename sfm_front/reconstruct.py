@@ -77,9 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Reconstruct; 0 if there is a model, 1 if none could be built."""
     folder: Path = arguments.folder
     output: Path = arguments.output or default_output(folder)
-    photos = order_photos(
-        list_photos(folder, exclude=output), arguments.order, seed=arguments.seed
-    )
+    photos = order_photos(list_photos(folder, exclude=output), arguments.order, seed=arguments.seed)
     options = session_options(arguments)
 
     import pycolmap

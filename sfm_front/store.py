@@ -37,9 +37,7 @@ class Store:
                 rig = pycolmap.Rig(rig_id=camera.camera_id)
                 rig.add_ref_sensor(camera.sensor_id)
                 database.write_rig(rig, use_rig_id=True)
-            image = pycolmap.Image(
-                name=photo.name, camera_id=camera.camera_id, image_id=image_id
-            )
+            image = pycolmap.Image(name=photo.name, camera_id=camera.camera_id, image_id=image_id)
             frame = pycolmap.Frame(frame_id=image_id, rig_id=camera.camera_id)
             frame.add_data_id(image.data_id)
             database.write_image(image, use_image_id=True)

@@ -82,9 +82,7 @@ class Verifier:
         """How many matches survive RANSAC on a fundamental matrix; 0 where there is none."""
         return int(np.count_nonzero(self._gate(view1, view2, matches)))
 
-    def verify(
-        self, view1: View, view2: View, matches: Uint32Array
-    ) -> PairGeometry | Rejection:
+    def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | Rejection:
         """Two-view geometry of two photos from their tentative matches (M, 2).
 
         A fundamental matrix (OpenCV's USAC) gates first: where nothing matches it takes
@@ -135,9 +133,7 @@ class Verifier:
         rng = np.random.default_rng(self.options.seed)
         return np.sort(rng.choice(survivors, self.options.model_sample, replace=False))
 
-    def _estimate(
-        self, view1: View, view2: View, matches: Uint32Array
-    ) -> pycolmap.TwoViewGeometry:
+    def _estimate(self, view1: View, view2: View, matches: Uint32Array) -> pycolmap.TwoViewGeometry:
         aligned = np.repeat(np.arange(len(matches), dtype=np.uint32)[:, None], 2, axis=1)
         return pycolmap.estimate_calibrated_two_view_geometry(
             view1.camera,
@@ -163,4 +159,3 @@ class Verifier:
         # Written so that a ray that cannot be undistorted (nan) counts as an outlier.
         inside: NDArray[np.bool_] = algebraic**2 <= max_error**2 * gradient
         return inside
-

@@ -27,9 +27,7 @@ class InitializationOptions:
     a photo arrives."""
 
     relaxations: tuple[Relaxation, ...] = (
-        Relaxation(
-            min_waiting=2, demands=InitialPairDemands(min_angle_deg=16, min_inliers=100)
-        ),
+        Relaxation(min_waiting=2, demands=InitialPairDemands(min_angle_deg=16, min_inliers=100)),
         Relaxation(min_waiting=4, demands=InitialPairDemands(min_angle_deg=8, min_inliers=60)),
         Relaxation(
             min_waiting=6,
@@ -59,9 +57,7 @@ class Initializer:
         self._mapper_options = mapper_options
         self._tried: set[tuple[int, int, int]] = set()
 
-    def start(
-        self, group: Collection[int], *, last_call: bool = False
-    ) -> tuple[Model, str] | None:
+    def start(self, group: Collection[int], *, last_call: bool = False) -> tuple[Model, str] | None:
         """A model of two photos of the group, the strictest demands and strongest pairs first.
 
         On the last call no more photos will come, and few may be asked for as little as many.

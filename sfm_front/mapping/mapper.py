@@ -121,9 +121,7 @@ class Model:
         """Let the model know of a photo that has just been added to the scene."""
         self._scene.extend(self._mapper, self.reconstruction, image_id)
 
-    def initialize(
-        self, image_id1: int, image_id2: int, demands: InitialPairDemands
-    ) -> bool:
+    def initialize(self, image_id1: int, image_id2: int, demands: InitialPairDemands) -> bool:
         """Start from a pair. False, and of no further use, if the pair does not carry a model."""
         self._demand(demands)
         cam2_from_cam1 = self._mapper.estimate_initial_two_view_geometry(
@@ -138,9 +136,7 @@ class Model:
             self._mapper.triangulate_image(self._triangulation, image_id)
         if self.num_points < self._options.min_initial_points:
             return False
-        self._mapper.adjust_global_bundle(
-            self._mapping, self._final.get_global_bundle_adjustment()
-        )
+        self._mapper.adjust_global_bundle(self._mapping, self._final.get_global_bundle_adjustment())
         self.reconstruction.normalize()
         self._mapper.filter_points(self._mapping)
         if self.num_points < self._options.min_initial_points:

@@ -81,9 +81,7 @@ class Scene:
         """Median triangulation angle of a verified pair, by its own two-view geometry."""
         return math.degrees(self._angles_rad[pair])
 
-    def component(
-        self, start: Iterable[int], *, among: Collection[int] | None = None
-    ) -> set[int]:
+    def component(self, start: Iterable[int], *, among: Collection[int] | None = None) -> set[int]:
         """Photos linked to the given ones by chains of verified pairs, these included.
 
         ``among`` limits the chains to these photos.
