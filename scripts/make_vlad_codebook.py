@@ -11,6 +11,8 @@ import cv2
 import faiss
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from sfm_front.errors import SfmFrontError
 from sfm_front.features.codebook import SHIPPED_CODEBOOK, train_codebook
 from sfm_front.features.sift import SiftExtractor
