@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
-from sfm_front.types import Float32Array, Uint8Array, Uint32Array
+from sfm_front.orientation import sectors
+from sfm_front.types import Features, Float32Array, Uint8Array, Uint32Array
 
 _SQUARED_NORM = 512.0**2
 # Rows of similarities that stay in the cache between the passes over them.
@@ -43,25 +46,59 @@ def match(
     product serves both directions; taking rows by the block keeps the search for the best two in
     the cache, where faiss' two searches took 1.2 (4000 × 4000) to 2.6 times (800 × 800) as long.
     """
-    if len(descriptors1) < 2 or len(descriptors2) < 2:
-        return NO_MATCHES
+    everything = slice(0, len(descriptors2))
+    blocks = [
+        (slice(start, min(start + _BLOCK, len(descriptors1))), everything)
+        for start in range(0, len(descriptors1), _BLOCK)
+    ]
+    return _match(descriptors1, descriptors2, np.arange(len(descriptors2)), blocks, options)
+
+
+def match_turned(
+    features1: Features, features2: Features, turn_rad: float, options: MatchingOptions
+) -> Uint32Array:
+    """Like ``match``, but only features whose orientations agree with the photos' turn meet.
+
+    On pairs of nine scenes it took 0.24 to 0.55 of the time and gave 1.03 to 1.21 times the
+    inliers: a feature's second nearest is not sought where no match can be.
+    """
+    plan = sectors(features1.keypoints[:, 3], features2.keypoints[:, 3], turn_rad)
+    descriptors1 = features1.descriptors[plan.order1]
+    descriptors2 = features2.descriptors[plan.order2]
+    found = _match(descriptors1, descriptors2, plan.order2, plan.blocks, options)
+    found[:, 0] = plan.order1[found[:, 0]]
+    return found[np.argsort(found[:, 0])]
+
+
+def _match(
+    descriptors1: Uint8Array,
+    descriptors2: Uint8Array,
+    index2: NDArray[np.intp],
+    blocks: Iterable[tuple[slice, slice]],
+    options: MatchingOptions,
+) -> Uint32Array:
+    """Mutual nearest neighbours within blocks; ``index2`` says which feature a column shows."""
     first = descriptors1.astype(np.float32)
     second = np.ascontiguousarray(descriptors2.T, np.float32)
     count = len(first)
-    nearest = np.empty(count, np.intp)
-    best = np.empty(count, np.float32)
-    runner_up = np.empty(count, np.float32)
-    best_of_second = np.zeros(second.shape[1], np.float32)
-    buffer = np.empty((min(_BLOCK, count), second.shape[1]), np.float32)
-    for start in range(0, count, _BLOCK):
-        block = slice(start, min(start + _BLOCK, count))
-        rows = np.arange(block.stop - start)
-        similarity = np.matmul(first[block], second, out=buffer[: len(rows)])
-        np.maximum(best_of_second, similarity.max(axis=0), out=best_of_second)
-        nearest[block] = similarity.argmax(axis=1)
-        best[block] = similarity[rows, nearest[block]]
-        similarity[rows, nearest[block]] = -1
-        runner_up[block] = similarity.max(axis=1)
+    nearest = np.zeros(count, np.intp)
+    best = np.full(count, -1, np.float32)
+    runner_up = np.full(count, -1, np.float32)
+    best_of_second = np.zeros(index2.max(initial=-1) + 1, np.float32)
+    for rows, columns in blocks:
+        if rows.stop == rows.start or columns.stop - columns.start < 2:
+            continue
+        similarity = first[rows] @ second[:, columns]
+        index = index2[columns]
+        best_of_second[index] = np.maximum(best_of_second[index], similarity.max(axis=0))
+        row = np.arange(len(similarity))
+        of_row = similarity.argmax(axis=1)
+        nearest[rows] = index[of_row]
+        best[rows] = similarity[row, of_row]
+        similarity[row, of_row] = -1
+        runner_up[rows] = similarity.max(axis=1)
+    if count == 0 or len(best_of_second) == 0:
+        return NO_MATCHES
     angle = _angle(best)
     kept = np.flatnonzero(
         (angle <= options.max_angle_rad)

@@ -17,7 +17,7 @@ from sfm_front.features.sift import SiftExtractor
 from sfm_front.images import DuplicateFinder, PhotoReader
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.scene import Scene
-from sfm_front.matching import match
+from sfm_front.matching import match, match_turned
 from sfm_front.report import Report
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.retrieval.retriever import Retriever
@@ -199,20 +199,22 @@ class Session:
         self, view: View, candidates: Sequence[Candidate], clock: Stopwatch
     ) -> list[PairGeometry]:
         """Match a photo with its best candidates on all features; keep the verified pairs."""
-        others = [self._views[candidate.image_id] for candidate in candidates]
 
-        def match_with(other: View) -> Uint32Array:
-            return match(
-                view.features.descriptors, other.features.descriptors, self.options.matching
-            )
+        def match_with(candidate: Candidate) -> tuple[View, Uint32Array]:
+            other = self._views[candidate.image_id]
+            options = self.options.matching
+            if candidate.turn_rad is not None:
+                turn_rad = candidate.turn_rad
+                return other, match_turned(view.features, other.features, turn_rad, options)
+            return other, match(view.features.descriptors, other.features.descriptors, options)
 
         def verify_with(tentative: tuple[View, Uint32Array]) -> PairGeometry | Rejection:
             return self._verifier.verify(view, *tentative)
 
         with clock.stage("match"):
-            matches = self._workers.map(match_with, others)
+            matches = self._workers.map(match_with, candidates)
         with clock.stage("verify"):
-            verified = self._workers.map(verify_with, zip(others, matches, strict=True))
+            verified = self._workers.map(verify_with, matches)
         return [pair for pair in verified if isinstance(pair, PairGeometry)]
 
 

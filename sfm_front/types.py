@@ -122,12 +122,17 @@ class DescribedPhoto:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A photo that may overlap the query: ``cosine`` of the global vectors in [-1, 1], and the
-    SIFT matches that survived RANSAC (``None`` where the candidate was not re-ranked)."""
+    """A photo that may overlap the query.
+
+    ``cosine`` of the global vectors in [-1, 1]; ``inliers``: SIFT matches that survived RANSAC,
+    None where the candidate was not re-ranked; ``turn_rad``: how far keypoints turn from the query
+    to the candidate in the image plane, None where that is not known.
+    """
 
     image_id: int
     cosine: float
     inliers: int | None = None
+    turn_rad: float | None = None
 
 
 class Rejection(Enum):

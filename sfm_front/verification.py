@@ -78,9 +78,13 @@ class Verifier:
         # The gate leaves hardly an outlier: COLMAP's 100 trials would mostly repeat themselves.
         ransac.min_num_trials = 30
 
+    def inliers(self, view1: View, view2: View, matches: Uint32Array) -> Uint32Array:
+        """(K, 2) matches that survive RANSAC on a fundamental matrix; none where there is none."""
+        return matches[self._gate(view1, view2, matches)]
+
     def count_inliers(self, view1: View, view2: View, matches: Uint32Array) -> int:
-        """How many matches survive RANSAC on a fundamental matrix; 0 where there is none."""
-        return int(np.count_nonzero(self._gate(view1, view2, matches)))
+        """How many these are."""
+        return len(self.inliers(view1, view2, matches))
 
     def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | Rejection:
         """Two-view geometry of two photos from their tentative matches (M, 2).

@@ -73,6 +73,14 @@ def test_a_stream_that_begins_badly_ends_whole():
     assert_whole(atlas, sparse)
 
 
+def test_photos_with_few_points_are_a_model_when_no_more_will_come():
+    poor = make_scene(NUM_PHOTOS, 100, seed=1, layout="orbit", background_ratio=0.0)
+    atlas = run(SceneFeed(poor), range(5))
+    assert atlas.models == []
+    atlas.finish()
+    assert [model.num_registered for model in atlas.models] == [5]
+
+
 def test_two_places_are_two_models(orbit):
     other = make_scene(NUM_PHOTOS, 500, seed=5, layout="orbit")
     feed = SceneFeed(orbit)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from photo_stream import SceneFeed, position_errors_m
@@ -96,8 +98,20 @@ def test_a_pair_with_few_matches_starts_nothing(orbit):
 def test_a_start_with_few_points_is_rejected(orbit):
     feed = SceneFeed(orbit)
     feed.add_all(range(3))
-    options = MapperOptions(min_initial_points=5_000)
-    assert not Model(feed.scene, options).initialize(2, 1, DEMANDS)
+    many = replace(DEMANDS, min_points=5_000)
+    assert not Model(feed.scene, MapperOptions()).initialize(2, 1, many)
+
+
+def test_a_photo_whose_camera_cannot_be_is_not_in_the_finished_model(orbit):
+    feed = SceneFeed(orbit)
+    ids = feed.add_all(range(6))
+    model = Model(feed.scene, MapperOptions(num_threads=1, refine_intrinsics=False))
+    assert model.initialize(2, 1, DEMANDS)
+    model.grow(set(ids) - model.registered)
+    camera = model.reconstruction.camera(1)
+    camera.focal_length = 100 * camera.width
+    model.finish()
+    assert model.registered == set()
 
 
 def test_photos_that_see_nothing_of_it_are_left_alone(orbit):
@@ -180,9 +194,12 @@ def test_a_model_is_the_same_to_the_bit_with_one_thread(orbit):
     np.testing.assert_array_equal(poses[0], poses[1])
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"min_initial_points": 0}, {"retry_growth": 0.9}, {"num_threads": 0}]
-)
+@pytest.mark.parametrize("wrong", [{"retry_growth": 0.9}, {"num_threads": 0}])
 def test_values_out_of_range_are_refused_by_name(wrong):
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         MapperOptions(**wrong)
+
+
+def test_a_model_of_no_points_cannot_be_asked_for():
+    with pytest.raises(ConfigError, match="min_points"):
+        InitialPairDemands(min_angle_deg=10, min_inliers=50, min_points=0)

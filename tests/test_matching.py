@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic import make_scene
-from sfm_front.matching import MatchingOptions, match
+from sfm_front.matching import MatchingOptions, match, match_turned
+from sfm_front.types import Features
 
 
 def brute_force(
@@ -106,6 +107,56 @@ def test_a_strided_selection_of_descriptors_is_fine(neighbours):
         match(neighbours[0][::2], neighbours[1][::2], MatchingOptions()),
         match(first, second, MatchingOptions()),
     )
+
+
+def oriented(descriptors: NDArray[np.uint8], orientations: NDArray[np.float64]) -> Features:
+    keypoints = np.zeros((len(descriptors), 4), np.float32)
+    keypoints[:, 3] = orientations
+    return Features(keypoints, descriptors, np.zeros((len(descriptors), 3), np.uint8))
+
+
+def test_where_all_are_turned_alike_it_is_matching_as_before(neighbours):
+    turned = [oriented(part, np.full(len(part), angle)) for part, angle in zip(neighbours, (1, 3), strict=True)]
+    found = match_turned(*turned, 2.0, MatchingOptions())
+    assert found.dtype == np.uint32
+    np.testing.assert_array_equal(found, match(*neighbours, MatchingOptions()))
+
+
+def test_only_those_turned_alike_match(neighbours):
+    first, second = neighbours
+    matches = match(first, second, MatchingOptions())
+    rng = np.random.default_rng(0)
+    orientations = rng.uniform(0, 2 * np.pi, len(first))
+    turned = rng.uniform(0, 2 * np.pi, len(second))
+    turned[matches[:, 1]] = orientations[matches[:, 0]] + 2.5
+    opposed = matches[::2]
+    turned[opposed[:, 1]] += np.pi
+    photos = oriented(first, orientations), oriented(second, turned)
+    found = {tuple(row) for row in match_turned(*photos, 2.5, MatchingOptions()).tolist()}
+    assert {tuple(row) for row in matches[1::2].tolist()} <= found
+    assert not found & {tuple(row) for row in opposed.tolist()}
+
+
+def test_a_second_nearest_that_is_turned_elsewhere_does_not_make_it_ambiguous(neighbours):
+    descriptors = neighbours[0][:50]
+    repeated = np.concatenate([descriptors, descriptors])
+    photos = (
+        oriented(descriptors, np.zeros(50)),
+        oriented(repeated, np.repeat([0.0, np.pi], 50)),
+    )
+    matches = match_turned(*photos, 0.0, MatchingOptions())
+    np.testing.assert_array_equal(matches, np.arange(50)[:, None].repeat(2, axis=1))
+    assert len(match(descriptors, repeated, MatchingOptions())) == 0
+
+
+@pytest.mark.parametrize(("count1", "count2"), [(0, 5), (5, 0), (1, 5), (0, 0)])
+def test_too_few_to_compare_give_no_matches_either_way(count1, count2):
+    rng = np.random.default_rng(0)
+    photos = [
+        oriented(rng.integers(0, 90, (n, 128), dtype=np.uint8), np.zeros(n))
+        for n in (count1, count2)
+    ]
+    assert match_turned(*photos, 0.0, MatchingOptions()).shape == (0, 2)
 
 
 @pytest.mark.parametrize("wrong", [{"max_ratio": 0.0}, {"max_ratio": 1.1}, {"max_angle_rad": 0.0}])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pycolmap
 import pytest
-from photo_stream import SceneFeed, centre_of, true_matches
+from photo_stream import SceneFeed, centre_of, true_matches, true_pair
 
 from sfm_front.evaluation.synthetic import SyntheticScene, make_scene
 from sfm_front.mapping.scene import Scene
@@ -48,6 +49,17 @@ def test_the_angle_of_a_pair_is_in_degrees(orbit, feed):
     towards = [centre_of(orbit.cams_from_world[i]) for i in (0, 1)]
     cosine = towards[0] @ towards[1] / np.prod([np.linalg.norm(v) for v in towards])
     assert feed.scene.angle_deg((2, 1)) == pytest.approx(np.degrees(np.arccos(cosine)), rel=0.4)
+
+
+def test_the_angle_of_a_pair_without_a_relative_pose_is_unknown(orbit):
+    pair = true_pair(orbit, 0, 1, (2, 1))
+    pair.two_view_geometry.tri_angle = -1
+    scene = Scene()
+    for image_id in (1, 2):
+        keypoints = orbit.photo(2 - image_id).features.keypoints
+        camera = pycolmap.Camera(orbit.camera.todict())
+        scene.add(image_id, f"{image_id}.jpg", camera, keypoints, [pair] if image_id == 2 else [])
+    assert scene.angle_deg((2, 1)) is None
 
 
 def test_components_follow_the_pairs(feed):

@@ -19,7 +19,7 @@ from sfm_front.types import Features, Photo
 POSITION_TOLERANCE_PX = 0.1  # of the pixels that SIFT works on
 COLMAP_OFFSET_PX = 0.05  # median, each axis, between two implementations of SIFT
 COLMAP_SCALE_RATIO = 0.05
-COLMAP_ANGLE_RAD = 0.1
+COLMAP_ANGLE_RAD = 0.12
 COLMAP_COSINE = 0.95  # median, between the descriptors of one keypoint by both
 
 # x, y in COLMAP's pixels: the top-left pixel's centre is (0.5, 0.5), its corner (0, 0).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
@@ -109,6 +110,8 @@ class Atlas:
             self._settle()
         for model in self.models:
             model.finish()
+        self.models = [model for model in self.models if model.num_registered > 1]
+        self._join()
 
     def _grow(self) -> bool:
         """Grow every model, the largest first; True if any grew."""
@@ -196,12 +199,24 @@ class Atlas:
             seen |= group
             if len(group) < self._options.min_model_size:
                 continue
-            started = self._initializer.start(group, last_call=True)
-            if started is not None:
-                model, event = started
+            best = self._best_start(group)
+            if best is not None:
+                model, event = best
                 self._events.append(event)
                 self.models.append(model)
                 self._settle()
+
+    def _best_start(self, group: Collection[int]) -> tuple[Model, str] | None:
+        """Of the models that start within a group, the first to hold most of it, or the largest."""
+        best: tuple[Model, str] | None = None
+        while (started := self._initializer.start(group, last_call=True)) is not None:
+            model, _ = started
+            model.grow(group)
+            if best is None or _size(model) > _size(best[0]):
+                best = started
+            if model.num_registered >= self._options.min_share * len(group):
+                break
+        return best
 
     def _place_without_structure(self) -> bool:
         """Register by two-view geometry alone what sees too few points; True if any was."""
@@ -221,3 +236,7 @@ class Atlas:
             else:
                 self._events.append(f"model with only {len(own)} photos of its own dropped")
         self.models = kept
+
+
+def _size(model: Model) -> tuple[int, int]:
+    return model.num_registered, model.num_points

@@ -14,9 +14,12 @@ _ANGLE_TOLERANCE = 0.7
 
 @dataclass(frozen=True, kw_only=True)
 class Relaxation:
-    """What an initial pair must show once this many photos wait."""
+    """What an initial pair must show once this many photos wait.
 
-    min_waiting: int
+    ``min_waiting`` of None: asked for only when no more photos will come.
+    """
+
+    min_waiting: int | None
     demands: InitialPairDemands
 
 
@@ -24,7 +27,7 @@ class Relaxation:
 class InitializationOptions:
     """``relaxations``: from COLMAP's own demands downwards; nadir flights need a smaller angle,
     and driving along a street 1° and forward motion. ``max_trials``: pairs estimated each time
-    a photo arrives."""
+    a photo arrives; ``max_last_trials``: when no more will."""
 
     relaxations: tuple[Relaxation, ...] = (
         Relaxation(min_waiting=2, demands=InitialPairDemands(min_angle_deg=16, min_inliers=100)),
@@ -37,8 +40,19 @@ class InitializationOptions:
             min_waiting=10,
             demands=InitialPairDemands(min_angle_deg=1, min_inliers=50, max_forward_motion=1),
         ),
+        Relaxation(
+            min_waiting=None,
+            demands=InitialPairDemands(
+                min_angle_deg=2,
+                min_inliers=20,
+                max_forward_motion=1,
+                min_points=15,
+                refine_intrinsics=False,
+            ),
+        ),
     )
     max_trials: int = 4
+    max_last_trials: int = 60
 
 
 class Initializer:
@@ -63,21 +77,22 @@ class Initializer:
         On the last call no more photos will come, and few may be asked for as little as many.
         Returns the model with a line on how it began, or None when the trials are used up.
         """
-        trials = 0
+        trials = self._options.max_last_trials if last_call else self._options.max_trials
         for level, relaxation in enumerate(self._options.relaxations):
-            if len(group) < relaxation.min_waiting and not last_call:
+            if not last_call and not _allowed(relaxation, len(group)):
                 break
             demanded_deg = relaxation.demands.min_angle_deg
             for pair in self._scene.pairs(group):
                 if (*pair, level) in self._tried:
                     continue
-                # The angle is known from verification, with the focal length's error in it.
-                if self._scene.angle_deg(pair) < _ANGLE_TOLERANCE * demanded_deg:
+                # Known from verification, with the focal length's error in it, or not at all.
+                angle_deg = self._scene.angle_deg(pair)
+                if angle_deg is not None and angle_deg < _ANGLE_TOLERANCE * demanded_deg:
                     continue
-                if trials == self._options.max_trials:
+                if trials == 0:
                     return None
                 self._tried.add((*pair, level))
-                trials += 1
+                trials -= 1
                 model = Model(self._scene, self._mapper_options, self._clock)
                 if model.initialize(*pair, relaxation.demands):
                     return model, _describe(pair, relaxation.demands)
@@ -86,6 +101,8 @@ class Initializer:
     def best_starts(self, per_relaxation: int) -> Iterator[tuple[Model, str]]:
         """Models of two photos from the pairs that COLMAP finds best in the whole scene."""
         for relaxation in self._options.relaxations:
+            if relaxation.min_waiting is None:
+                break
             finder = Model(self._scene, self._mapper_options, self._clock)
             for _ in range(per_relaxation):
                 pair = finder.find_initial_pair(relaxation.demands)
@@ -94,6 +111,10 @@ class Initializer:
                 model = Model(self._scene, self._mapper_options, self._clock)
                 if model.initialize(*pair, relaxation.demands):
                     yield model, _describe(pair, relaxation.demands)
+
+
+def _allowed(relaxation: Relaxation, num_waiting: int) -> bool:
+    return relaxation.min_waiting is not None and num_waiting >= relaxation.min_waiting
 
 
 def _describe(pair: tuple[int, int], demands: InitialPairDemands) -> str:

@@ -19,23 +19,31 @@ _UNLIMITED_TRIALS = 1_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class InitialPairDemands:
-    """What two photos must show to start a model: see COLMAP's ``init_*`` options."""
+    """What two photos must show to start a model: see COLMAP's ``init_*`` options.
+
+    ``min_points``: a new model with fewer 3-D points is rejected. ``refine_intrinsics``: whether
+    the two photos' own adjustment may move focal length and distortion; few points cannot tell.
+    """
 
     min_angle_deg: float
     min_inliers: int
     max_forward_motion: float = 0.95
+    min_points: int = 50
+    refine_intrinsics: bool = True
+
+    def __post_init__(self) -> None:
+        if self.min_points < 1:
+            raise ConfigError(f"min_points must be at least 1, got {self.min_points}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapperOptions:
     """How a model is grown. What is not named here is COLMAP's default.
 
-    ``min_initial_points``: a new model with fewer points is rejected.
     ``retry_growth``: a photo that failed is tried again once it sees this many times the points.
     ``num_threads``: of the bundle adjustment. ``seed``: of all RANSAC.
     """
 
-    min_initial_points: int = 50
     retry_growth: float = 1.2
     refine_intrinsics: bool = True
     num_threads: int = 2
@@ -43,10 +51,6 @@ class MapperOptions:
     schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
 
     def __post_init__(self) -> None:
-        if self.min_initial_points < 1:
-            raise ConfigError(
-                f"min_initial_points must be at least 1, got {self.min_initial_points}"
-            )
         if self.retry_growth < 1:
             raise ConfigError(f"retry_growth must be at least 1, got {self.retry_growth}")
         if self.num_threads < 1:
@@ -124,6 +128,10 @@ class Model:
     def initialize(self, image_id1: int, image_id2: int, demands: InitialPairDemands) -> bool:
         """Start from a pair. False, and of no further use, if the pair does not carry a model."""
         self._demand(demands)
+        # What starts with few points can ask no more of the photos that follow.
+        self._mapping.abs_pose_min_num_inliers = min(
+            self._mapping.abs_pose_min_num_inliers, demands.min_points
+        )
         cam2_from_cam1 = self._mapper.estimate_initial_two_view_geometry(
             self._mapping, image_id1, image_id2
         )
@@ -134,12 +142,15 @@ class Model:
         )
         for image_id in (image_id1, image_id2):
             self._mapper.triangulate_image(self._triangulation, image_id)
-        if self.num_points < self._options.min_initial_points:
+        if self.num_points < demands.min_points:
             return False
-        self._mapper.adjust_global_bundle(self._mapping, self._final.get_global_bundle_adjustment())
+        adjustment = self._final.get_global_bundle_adjustment()
+        adjustment.refine_focal_length &= demands.refine_intrinsics
+        adjustment.refine_extra_params &= demands.refine_intrinsics
+        self._mapper.adjust_global_bundle(self._mapping, adjustment)
         self.reconstruction.normalize()
         self._mapper.filter_points(self._mapping)
-        if self.num_points < self._options.min_initial_points:
+        if self.num_points < demands.min_points:
             return False
         self._note_refined()
         return True
@@ -192,6 +203,7 @@ class Model:
                 num_threads=self._options.num_threads,
             ),
         )
+        _drop_degenerate(self.reconstruction, self._mapping)
 
     def forget_failures(self) -> None:
         """Let every waiting photo be tried again."""
@@ -253,3 +265,18 @@ class Model:
 
     def _note_refined(self) -> None:
         self._schedule.refined(self.num_registered, self.num_points)
+
+
+def _drop_degenerate(
+    reconstruction: pycolmap.Reconstruction, limits: pycolmap.IncrementalMapperOptions
+) -> None:
+    """Take out photos whose camera has ended as no camera can be.
+
+    By COLMAP's limits, which it applies to models of 20 photos and more only.
+    """
+    for image_id in reconstruction.reg_image_ids():
+        image = reconstruction.image(image_id)
+        if reconstruction.camera(image.camera_id).has_bogus_params(
+            limits.min_focal_length_ratio, limits.max_focal_length_ratio, limits.max_extra_param
+        ):
+            reconstruction.deregister_frame(image.frame_id)

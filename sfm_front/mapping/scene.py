@@ -77,9 +77,13 @@ class Scene:
         ]
         return [(i, j) for _, i, j in sorted(found)]
 
-    def angle_deg(self, pair: tuple[int, int]) -> float:
-        """Median triangulation angle of a verified pair, by its own two-view geometry."""
-        return math.degrees(self._angles_rad[pair])
+    def angle_deg(self, pair: tuple[int, int]) -> float | None:
+        """Median triangulation angle of a verified pair, by its own two-view geometry.
+
+        None where that geometry has no relative pose, as without a focal length.
+        """
+        angle_rad = self._angles_rad[pair]
+        return math.degrees(angle_rad) if angle_rad >= 0 else None
 
     def component(self, start: Iterable[int], *, among: Collection[int] | None = None) -> set[int]:
         """Photos linked to the given ones by chains of verified pairs, these included.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from sfm_front.errors import ConfigError
 from sfm_front.matching import MatchingOptions, match
+from sfm_front.orientation import common_turn
 from sfm_front.types import Candidate
 from sfm_front.verification import Verifier, View
 from sfm_front.workers import Workers
@@ -41,7 +42,7 @@ class Reranker:
     def rerank(
         self, query: View, candidates: list[Candidate], views: Mapping[int, View]
     ) -> list[Candidate]:
-        """The same candidates with their inliers, most inliers first, ties by cosine."""
+        """The same candidates with inliers and turn, most inliers first, ties by cosine."""
 
         def count(candidate: Candidate) -> Candidate:
             view = views[candidate.image_id]
@@ -51,8 +52,11 @@ class Reranker:
                 view.features.descriptors[:limit],
                 self._matching,
             )
-            inliers = self._verifier.count_inliers(query, view, matches)
-            return replace(candidate, inliers=inliers)
+            inliers = self._verifier.inliers(query, view, matches)
+            turn_rad = common_turn(
+                query.features.keypoints[inliers[:, 0]], view.features.keypoints[inliers[:, 1]]
+            )
+            return replace(candidate, inliers=len(inliers), turn_rad=turn_rad)
 
         counted = self._workers.map(count, candidates)
         return sorted(counted, key=lambda c: (-(c.inliers or 0), -c.cosine))

@@ -1,0 +1,75 @@
+"""In-plane rotation between two photos, and which of their features it lets match."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sfm_front.types import Float32Array
+
+_FULL_TURN = 2 * np.pi
+# Of the verified matches of nine scenes, 87 to 99 % are turned within this of the pair's common
+# turn; 74 % in opensfm_lund, where facades stand aslant, and many pairs have no common turn.
+_TOLERANCE = np.deg2rad(20)
+_MIN_MATCHES = 16
+_MIN_AGREEING = 0.75
+_NUM_SECTORS = 24
+
+
+def common_turn(keypoints1: Float32Array, keypoints2: Float32Array) -> float | None:
+    """The angle, in radians, by which matching keypoints (M, 4) turn from photo 1 to photo 2.
+
+    None where the matches are too few to tell, or do not agree.
+    """
+    if len(keypoints1) < _MIN_MATCHES:
+        return None
+    turns = np.exp(1j * (keypoints2[:, 3] - keypoints1[:, 3]))
+    # Medians, not means: what does not agree must not pull.
+    common = float(np.angle(complex(np.median(turns.real), np.median(turns.imag))))
+    agreeing = np.abs(np.angle(turns * np.exp(-1j * common))) < _TOLERANCE
+    return common if agreeing.mean() >= _MIN_AGREEING else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sectors:
+    """Features in the order of their orientation, cut so that only alike ones meet.
+
+    ``order1`` (N,) and ``order2`` (M',): indices of features, those near the cut of the circle
+    twice in the second. ``blocks``: slices of both orders to be compared with each other.
+    """
+
+    order1: NDArray[np.intp]
+    order2: NDArray[np.intp]
+    blocks: tuple[tuple[slice, slice], ...]
+
+
+def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: float) -> Sectors:
+    """Features (N,) and (M,) that may match where photo 2 is turned by this against photo 1.
+
+    Each feature of photo 1 meets those of photo 2 within 20 degrees of where the turn takes it,
+    and some up to 35 degrees away. A sixth of all pairs meets where orientations are spread.
+    """
+    expected = np.mod(orientations1 + turn_rad, _FULL_TURN)
+    found = np.mod(orientations2, _FULL_TURN)
+    order1, order2 = np.argsort(expected, kind="stable"), np.argsort(found, kind="stable")
+    found = found[order2]
+    below, above = np.searchsorted(found, (_TOLERANCE, _FULL_TURN - _TOLERANCE))
+    circle = np.concatenate([found[above:] - _FULL_TURN, found, found[:below] + _FULL_TURN])
+    return Sectors(
+        order1,
+        np.concatenate([order2[above:], order2, order2[:below]]),
+        tuple(_blocks(expected[order1], circle)),
+    )
+
+
+def _blocks(expected: Float32Array, found: Float32Array) -> Iterator[tuple[slice, slice]]:
+    edges = np.linspace(0, _FULL_TURN, _NUM_SECTORS + 1)
+    rows = np.searchsorted(expected, edges)
+    rows[-1] = len(expected)
+    first = np.searchsorted(found, edges[:-1] - _TOLERANCE)
+    last = np.searchsorted(found, edges[1:] + _TOLERANCE)
+    for sector in range(_NUM_SECTORS):
+        yield slice(rows[sector], rows[sector + 1]), slice(first[sector], last[sector])
