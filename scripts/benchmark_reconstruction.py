@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -24,6 +22,7 @@ from sfm_front.evaluation.benchmark import OURS, Row, benchmark_scene
 from sfm_front.evaluation.benchmark_chart import check_matplotlib, write_chart
 from sfm_front.evaluation.benchmark_table import format_profile, format_table
 from sfm_front.evaluation.benchmark_types import CAMERA_MODES, BenchmarkSettings
+from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.rivals import RIVALS
 from sfm_front.evaluation.scenes import BenchmarkScene, find_scene
 
@@ -121,26 +120,11 @@ def check(args: argparse.Namespace, rivals: list[str], scenes: list[BenchmarkSce
 def write_json(out: Path, settings: BenchmarkSettings, rows: Sequence[Row]) -> None:
     content: dict[str, Any] = {
         "settings": asdict(settings),
-        "machine": {
-            "cpu": cpu_name(),
-            "cores": available_cores(),
-            "python": platform.python_version(),
-            "pycolmap": version("pycolmap"),
-            "opencv": version("opencv-python-headless"),
-        },
+        "machine": machine(),
         "rows": [row.as_dict() for row in rows],
     }
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
-
-
-def cpu_name() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()
 
 
 def main() -> int:

@@ -9,24 +9,28 @@ from pathlib import Path
 
 import cv2
 import faiss
-import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from sfm_front.errors import SfmFrontError
-from sfm_front.features.codebook import SHIPPED_CODEBOOK, train_codebook
+from sfm_front.features.codebook import SHIPPED_CODEBOOK
+from sfm_front.features.codebook_training import train_codebook
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.images import PhotoReader
 from sfm_front.source import list_photos
-from sfm_front.types import Skipped, Uint8Array
+from sfm_front.types import Features, Skipped
 
 
 def main() -> int:
     options = parse_arguments()
     try:
-        descriptors = np.concatenate(list(sample_descriptors(options)))
+        photos = list(extract_features(options))
         codebook = train_codebook(
-            descriptors, num_words=options.words, dimension=options.dimension, seed=options.seed
+            photos,
+            num_words=options.words,
+            dimension=options.dimension,
+            per_photo=options.per_photo,
+            seed=options.seed,
         )
         codebook.save(options.output)
     except (SfmFrontError, OSError) as error:
@@ -34,8 +38,8 @@ def main() -> int:
         return 2
     size_kb = options.output.stat().st_size / 1000
     print(
-        f"{options.output}: {options.words} words of {options.dimension} from {len(descriptors)} "
-        f"descriptors, {size_kb:.0f} kB, fingerprint {codebook.fingerprint}"
+        f"{options.output}: {options.words} words of {options.dimension} from {len(photos)} "
+        f"photos, {size_kb:.0f} kB, fingerprint {codebook.fingerprint}"
     )
     return 0
 
@@ -46,17 +50,19 @@ def parse_arguments() -> argparse.Namespace:
     )
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="photos")
     parser.add_argument("--output", type=Path, default=SHIPPED_CODEBOOK, help=".npz to write")
-    parser.add_argument("--words", type=int, default=512, help="number of visual words")
+    parser.add_argument("--words", type=int, default=256, help="number of visual words")
     parser.add_argument("--dimension", type=int, default=64, help="of projected descriptors")
-    parser.add_argument("--per-photo", type=int, default=400, help="descriptors drawn a photo")
+    parser.add_argument(
+        "--per-photo", type=int, default=400, help="descriptors drawn a photo to find words in"
+    )
     parser.add_argument("--max-features", type=int, default=4000, help="SIFT features a photo")
     parser.add_argument("--max-image-size", type=int, default=1600, help="in pixels")
     parser.add_argument("--seed", type=int, default=0, help="of the draw and of k-means")
     return parser.parse_args()
 
 
-def sample_descriptors(options: argparse.Namespace) -> Iterator[Uint8Array]:
-    """An equal draw of RootSIFT descriptors from each photo below the folders.
+def extract_features(options: argparse.Namespace) -> Iterator[Features]:
+    """The features of each photo below the folders that has any.
 
     Raises InputError for a folder that is not there or holds no photo.
     """
@@ -65,17 +71,15 @@ def sample_descriptors(options: argparse.Namespace) -> Iterator[Uint8Array]:
     faiss.omp_set_num_threads(1)
     reader = PhotoReader(max_image_size=options.max_image_size)
     extractor = SiftExtractor(options.max_features)
-    generator = np.random.default_rng(options.seed)
     for folder in options.folders:
-        photos = list_photos(folder)
-        for number, entry in enumerate(photos, start=1):
+        entries = list_photos(folder)
+        for number, entry in enumerate(entries, start=1):
             photo = reader.read(entry.path, entry.name)
             if isinstance(photo, Skipped):
                 print(f"skipped {entry.path}: {photo}", file=sys.stderr)
                 continue
-            descriptors = extractor.extract(photo).descriptors
-            yield descriptors[generator.permutation(len(descriptors))[: options.per_photo]]
-            print(f"\r{folder}: {number} of {len(photos)}", end="", file=sys.stderr, flush=True)
+            yield extractor.extract(photo)
+            print(f"\r{folder}: {number} of {len(entries)}", end="", file=sys.stderr, flush=True)
         print(file=sys.stderr)
 
 

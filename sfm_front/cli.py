@@ -7,7 +7,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 
-from sfm_front import __version__, reconstruct
+from sfm_front import __version__, reconstruct, retrieve
 from sfm_front.errors import SfmFrontError
 from sfm_front.viewers import cli as view
 
@@ -20,6 +20,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add(commands, "reconstruct", "folder of photos → sparse models", reconstruct)
+    _add(commands, "retrieve", "folder and photo → its most relevant photos", retrieve)
     _add(commands, "view", "look at a sparse model", view)
     arguments = parser.parse_args(argv)
     run: Callable[[argparse.Namespace], int] = arguments.run

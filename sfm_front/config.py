@@ -28,7 +28,9 @@ class SessionOptions:
 
     ``max_image_size``: long side in pixels that photos are reduced to. ``max_features``: SIFT
     keypoints a photo. ``global_descriptor``: a name that ``features.global_descriptor.resolve``
-    knows; ``weights``: a file for its network; ``device``: of its network.
+    knows; ``weights``: a file for its network; ``device``: ``auto``, ``cpu`` or
+    ``cuda``, of the network and of matching. ``rerank``: the look that ranks candidates;
+    ``second_look``: at those of which it told too little.
     ``matched``: re-ranked photos that are matched in full. ``threads``: cores to use.
     ``text``: write models in COLMAP's text form too.
     """
@@ -37,13 +39,14 @@ class SessionOptions:
     max_features: int = 4000
     global_descriptor: str = "auto"
     weights: Path | None = None
-    device: str = "cpu"
+    device: str = "auto"
     matched: int = 8
     text: bool = False
     threads: int = field(default_factory=available_cores)
     cameras: CameraOptions = field(default_factory=CameraOptions)
     retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
     rerank: RerankOptions = field(default_factory=RerankOptions)
+    second_look: RerankOptions = field(default_factory=lambda: RerankOptions(max_features=2000))
     matching: MatchingOptions = field(default_factory=MatchingOptions)
     verification: VerificationOptions = field(default_factory=VerificationOptions)
     atlas: AtlasOptions = field(default_factory=AtlasOptions)

@@ -7,15 +7,21 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
 from types import TracebackType
+from typing import Protocol
 
 import cv2
 
 from sfm_front.features.global_descriptor import GlobalDescriptor
-from sfm_front.features.sift import SiftExtractor
 from sfm_front.images import PhotoReader
 from sfm_front.source import PhotoPath
 from sfm_front.stopwatch import Stopwatch
-from sfm_front.types import DescribedPhoto, Float32Array, Photo, Skipped, SkipReason
+from sfm_front.types import DescribedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
+
+
+class FeatureExtractor(Protocol):
+    """Finds the SIFT features of a photo; threads may share it."""
+
+    def extract(self, photo: Photo) -> Features: ...
 
 
 class PhotoDescriber:
@@ -28,7 +34,7 @@ class PhotoDescriber:
     def __init__(
         self,
         reader: PhotoReader,
-        sift: SiftExtractor,
+        sift: FeatureExtractor,
         global_descriptor: GlobalDescriptor,
         *,
         num_threads: int,

@@ -12,7 +12,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.orientation import sectors
 from sfm_front.types import Features, Float32Array, Uint8Array, Uint32Array
 
-_SQUARED_NORM = 512.0**2
+SQUARED_NORM = 512.0**2
 # Rows of similarities that stay in the cache between the passes over them.
 _BLOCK = 256
 NO_MATCHES: Uint32Array = np.zeros((0, 2), np.uint32)
@@ -112,5 +112,5 @@ def _match(
 
 
 def _angle(similarity: Float32Array) -> Float32Array:
-    angle: Float32Array = np.arccos(np.minimum(similarity / _SQUARED_NORM, 1.0))
+    angle: Float32Array = np.arccos(np.minimum(similarity / SQUARED_NORM, 1.0))
     return angle

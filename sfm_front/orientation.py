@@ -13,10 +13,10 @@ from sfm_front.types import Float32Array
 _FULL_TURN = 2 * np.pi
 # Of the verified matches of nine scenes, 87 to 99 % are turned within this of the pair's common
 # turn; 74 % in opensfm_lund, where facades stand aslant, and many pairs have no common turn.
-_TOLERANCE = np.deg2rad(20)
+TOLERANCE_RAD = np.deg2rad(20)
 _MIN_MATCHES = 16
 _MIN_AGREEING = 0.75
-_NUM_SECTORS = 24
+NUM_SECTORS = 24
 
 
 def common_turn(keypoints1: Float32Array, keypoints2: Float32Array) -> float | None:
@@ -29,7 +29,7 @@ def common_turn(keypoints1: Float32Array, keypoints2: Float32Array) -> float | N
     turns = np.exp(1j * (keypoints2[:, 3] - keypoints1[:, 3]))
     # Medians, not means: what does not agree must not pull.
     common = float(np.angle(complex(np.median(turns.real), np.median(turns.imag))))
-    agreeing = np.abs(np.angle(turns * np.exp(-1j * common))) < _TOLERANCE
+    agreeing = np.abs(np.angle(turns * np.exp(-1j * common))) < TOLERANCE_RAD
     return common if agreeing.mean() >= _MIN_AGREEING else None
 
 
@@ -56,7 +56,7 @@ def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: 
     found = np.mod(orientations2, _FULL_TURN)
     order1, order2 = np.argsort(expected, kind="stable"), np.argsort(found, kind="stable")
     found = found[order2]
-    below, above = np.searchsorted(found, (_TOLERANCE, _FULL_TURN - _TOLERANCE))
+    below, above = np.searchsorted(found, (TOLERANCE_RAD, _FULL_TURN - TOLERANCE_RAD))
     circle = np.concatenate([found[above:] - _FULL_TURN, found, found[:below] + _FULL_TURN])
     return Sectors(
         order1,
@@ -66,10 +66,10 @@ def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: 
 
 
 def _blocks(expected: Float32Array, found: Float32Array) -> Iterator[tuple[slice, slice]]:
-    edges = np.linspace(0, _FULL_TURN, _NUM_SECTORS + 1)
+    edges = np.linspace(0, _FULL_TURN, NUM_SECTORS + 1)
     rows = np.searchsorted(expected, edges)
     rows[-1] = len(expected)
-    first = np.searchsorted(found, edges[:-1] - _TOLERANCE)
-    last = np.searchsorted(found, edges[1:] + _TOLERANCE)
-    for sector in range(_NUM_SECTORS):
+    first = np.searchsorted(found, edges[:-1] - TOLERANCE_RAD)
+    last = np.searchsorted(found, edges[1:] + TOLERANCE_RAD)
+    for sector in range(NUM_SECTORS):
         yield slice(rows[sector], rows[sector + 1]), slice(first[sector], last[sector])

@@ -11,39 +11,17 @@ from typing import Any, TextIO
 from sfm_front.types import StepReport
 
 
-class ProgressLine:
-    """One line that renews itself on a terminal; a line a photo anywhere else."""
+class LiveLine:
+    """A line that renews itself on a terminal; a line each time anywhere else."""
 
-    def __init__(self, total: int, stream: TextIO) -> None:
-        self._total = total
+    def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._live = stream.isatty()
-        self._started = time.perf_counter()
-        self._done = 0
-        self._registered = 0
-        self._points = 0
-
-    def show(self, step: StepReport) -> None:
-        """Count a photo and show where things stand."""
-        self._done += 1
-        if step.skipped is not None:
-            self.note(f"skipped {step.name}: {step.skipped}")
-        else:
-            self._registered, self._points = step.num_registered, step.num_points
-        seconds = (time.perf_counter() - self._started) / self._done
-        left = seconds * (self._total - self._done)
-        self._write(
-            f"photo {self._done}/{self._total}  registered {self._registered}  "
-            f"points {self._points}  {seconds:.2f} s a photo  {_clock(left)} left"
-        )
 
     def note(self, text: str) -> None:
         """A line of its own, kept."""
         self._erase()
         print(text, file=self._stream, flush=True)
-
-    def finishing(self) -> None:
-        self._write("last refinement, then writing the models …")
 
     def end(self) -> None:
         self._erase()
@@ -60,6 +38,52 @@ class ProgressLine:
         if self._live:
             self._stream.write("\r\x1b[K")
             self._stream.flush()
+
+
+class ProgressLine(LiveLine):
+    """Where a reconstruction stands, photo by photo."""
+
+    def __init__(self, total: int, stream: TextIO) -> None:
+        super().__init__(stream)
+        self._total = total
+        self._started = time.perf_counter()
+        self._done = 0
+        self._registered = 0
+        self._points = 0
+
+    def show(self, step: StepReport) -> None:
+        """Count a photo and show where things stand."""
+        self._done += 1
+        if step.skipped is not None:
+            self.note(f"skipped {step.name}: {step.skipped}")
+        else:
+            self._registered, self._points = step.num_registered, step.num_points
+        self._write(
+            f"photo {self._done}/{self._total}  registered {self._registered}  "
+            f"points {self._points}  {_pace(self._started, self._done, self._total)}"
+        )
+
+    def finishing(self) -> None:
+        self._write("last refinement, then writing the models …")
+
+
+class CountLine(LiveLine):
+    """How many of ``total`` photos are done; where there is no terminal, a line each tenth."""
+
+    def __init__(self, what: str, total: int, stream: TextIO) -> None:
+        super().__init__(stream)
+        self._what = what
+        self._total = total
+        self._started = time.perf_counter()
+        self._done = 0
+
+    def count(self) -> None:
+        """Count a photo and show where things stand."""
+        self._done += 1
+        tenths_before, tenths = (10 * n // self._total for n in (self._done - 1, self._done))
+        if self._live or tenths > tenths_before:
+            pace = _pace(self._started, self._done, self._total)
+            self._write(f"{self._what} {self._done}/{self._total}  {pace}")
 
 
 def closing_summary(report: dict[str, Any], output: Path) -> str:
@@ -123,6 +147,11 @@ def _reasons(what: str, rows: list[tuple[str, str]]) -> list[str]:
         f"{what}: {len(rows)} photos (each in report.json)",
         *(f"  {count} × {why}" for why, count in counted),
     ]
+
+
+def _pace(started: float, done: int, total: int) -> str:
+    seconds = (time.perf_counter() - started) / done
+    return f"{seconds:.2f} s a photo  {_clock(seconds * (total - done))} left"
 
 
 def _plural(count: int, noun: str) -> str:

@@ -70,6 +70,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     retrieval.add_argument(
         "--matched", type=int, metavar="N", help="best of them matched in full (default: 8)"
     )
+    parser.add_argument(
+        "--device",
+        help="of networks and matching: auto (default: a GPU where PyTorch can use one), cpu, cuda",
+    )
     parser.add_argument("--threads", type=int, metavar="N", help="cores to use (default: all)")
 
 
@@ -89,8 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
         Session(output, options, overwrite=arguments.overwrite) as session,
         _interruptible() as interrupted,
     ):
-        if session.message:
-            print(session.message)
+        for message in session.messages:
+            print(message)
         progress = ProgressLine(len(photos), sys.stdout)
         for step in session.stream(photos):
             progress.show(step)
@@ -123,7 +127,14 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     threads = available_cores() if arguments.threads is None else arguments.threads
     given = {
         name: value
-        for name in ("max_image_size", "max_features", "global_descriptor", "weights", "matched")
+        for name in (
+            "max_image_size",
+            "max_features",
+            "global_descriptor",
+            "weights",
+            "matched",
+            "device",
+        )
         if (value := getattr(arguments, name)) is not None
     }
     retrieval = {} if arguments.candidates is None else {"candidates": arguments.candidates}

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from sfm_front.types import ModelSummary, StepReport
+from sfm_front.types import STAGES_AHEAD, ModelSummary, StepReport
 
 
 class Report:
@@ -150,10 +150,14 @@ class Report:
         }
 
     def _median_seconds_by_quarter(self) -> list[float]:
-        """Work on a photo by its quarter of the session, global refinement apart: it should not
-        grow once there are as many photos as candidates."""
+        """Work on a photo in its turn by quarter of the session, global refinement apart.
+
+        It should not grow once there are as many photos as candidates. What runs ahead is left
+        out: beside a growing model it waits longer for the processor.
+        """
+        left_out = STAGES_AHEAD | {"refine"}
         work = [
-            sum(seconds for stage, seconds in step.seconds.items() if stage != "refine")
+            sum(seconds for stage, seconds in step.seconds.items() if stage not in left_out)
             for step in self._steps
             if step.image_id is not None
         ]

@@ -7,17 +7,22 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 
+import pycolmap
+
 from sfm_front.cameras import CameraCatalog
 from sfm_front.config import SessionOptions
-from sfm_front.describe import PhotoDescriber
+from sfm_front.describe import FeatureExtractor, PhotoDescriber
+from sfm_front.devices import usable_device
 from sfm_front.errors import InputError
 from sfm_front.export import export_models
+from sfm_front.features.colmap_sift import ColmapSift
 from sfm_front.features.global_descriptor import resolve
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.images import DuplicateFinder, PhotoReader
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.scene import Scene
-from sfm_front.matching import match, match_turned
+from sfm_front.matcher import make_matcher
+from sfm_front.pairing import Pairing
 from sfm_front.report import Report
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.retrieval.retriever import Retriever
@@ -72,28 +77,30 @@ class Session:
                 f"{output}: holds a reconstruction already. Give another --output, "
                 "or --overwrite to replace it."
             )
-        descriptor, self.message = resolve(
-            self.options.global_descriptor,
-            weights=self.options.weights,
-            device=self.options.device,
+        device, on_device = usable_device(self.options.device)
+        descriptor, on_descriptor = resolve(
+            self.options.global_descriptor, weights=self.options.weights, device=device
         )
+        self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         if overwrite:
             _clear(output)
         output.mkdir(parents=True, exist_ok=True)
         threads = self.options.threads
         self._describer = PhotoDescriber(
             PhotoReader(max_image_size=self.options.max_image_size),
-            SiftExtractor(self.options.max_features),
+            _extractor(device, self.options.max_features),
             descriptor,
             num_threads=threads,
         )
         self._workers = Workers(threads)
         self._verifier = Verifier(self.options.verification)
-        self._retriever = Retriever(
-            self.options.retrieval,
-            descriptor.dimension,
-            Reranker(self.options.rerank, self.options.matching, self._verifier, self._workers),
+        matcher = make_matcher(device, self.options.matching, self._workers)
+        first_look, second_look = (
+            Reranker(options, matcher, self._verifier, self._workers)
+            for options in (self.options.rerank, self.options.second_look)
         )
+        self._retriever = Retriever(self.options.retrieval, descriptor.dimension, first_look)
+        self._pairing = Pairing(matcher, second_look)
         self._duplicates = DuplicateFinder()
         self._cameras = CameraCatalog(self.options.cameras)
         self._store = Store(database)
@@ -200,22 +207,20 @@ class Session:
     ) -> list[PairGeometry]:
         """Match a photo with its best candidates on all features; keep the verified pairs."""
 
-        def match_with(candidate: Candidate) -> tuple[View, Uint32Array]:
-            other = self._views[candidate.image_id]
-            options = self.options.matching
-            if candidate.turn_rad is not None:
-                turn_rad = candidate.turn_rad
-                return other, match_turned(view.features, other.features, turn_rad, options)
-            return other, match(view.features.descriptors, other.features.descriptors, options)
-
         def verify_with(tentative: tuple[View, Uint32Array]) -> PairGeometry | Rejection:
             return self._verifier.verify(view, *tentative)
 
         with clock.stage("match"):
-            matches = self._workers.map(match_with, candidates)
+            matches = self._pairing.match(view, candidates, self._views)
         with clock.stage("verify"):
             verified = self._workers.map(verify_with, matches)
         return [pair for pair in verified if isinstance(pair, PairGeometry)]
+
+
+def _extractor(device: str, max_features: int) -> FeatureExtractor:
+    if device == "cuda" and pycolmap.has_cuda:
+        return ColmapSift(max_features)
+    return SiftExtractor(max_features)
 
 
 def _clear(output: Path) -> None:

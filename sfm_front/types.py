@@ -104,6 +104,10 @@ class Features:
     def __len__(self) -> int:
         return len(self.keypoints)
 
+    def largest(self, count: int) -> Features:
+        """Its first ``count`` features, without a copy."""
+        return Features(self.keypoints[:count], self.descriptors[:count], self.colors[:count])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DescribedPhoto:
@@ -160,6 +164,10 @@ class PairGeometry:
     @property
     def num_inliers(self) -> int:
         return len(self.two_view_geometry.inlier_matches)
+
+
+# Stages that run ahead of a photo's turn, beside the mapping of those before it.
+STAGES_AHEAD = frozenset({"read", "sift", "vlad", "network"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ class Workers:
     """
 
     def __init__(self, num_threads: int) -> None:
+        self.num_threads = num_threads
         self._pool = (
             ThreadPoolExecutor(num_threads, "sfm-pairs", threadpool_limits, (1, "openmp"))
             if num_threads > 1

@@ -42,3 +42,22 @@ def make_model(
         for xyz, color in zip(points, colors, strict=True):
             model.add_point3D(xyz, pycolmap.Track(), color.astype(np.uint8))
     return model
+
+
+def model_of(seen_by: Sequence[Sequence[str]]) -> pycolmap.Reconstruction:
+    """A model with a point for each of ``seen_by``, which names the photos that see it."""
+    names = sorted({name for photo in seen_by for name in photo})
+    cameras = {name: looking([i, 0, 0], [0, 1, 0], [0, 0, 1]) for i, name in enumerate(names)}
+    model = make_model(cameras)
+    ids = {image.name: image.image_id for image in model.images.values()}
+    for name, image_id in ids.items():
+        here = [i for i, photo in enumerate(seen_by) if name in photo]
+        model.images[image_id].points2D = [pycolmap.Point2D([5.0, 5.0]) for _ in here]
+    places = dict.fromkeys(names, 0)
+    for point in seen_by:
+        track = pycolmap.Track()
+        for name in point:
+            track.add_element(ids[name], places[name])
+            places[name] += 1
+        model.add_point3D(np.zeros(3), track, np.zeros(3, np.uint8))
+    return model

@@ -116,7 +116,10 @@ def oriented(descriptors: NDArray[np.uint8], orientations: NDArray[np.float64]) 
 
 
 def test_where_all_are_turned_alike_it_is_matching_as_before(neighbours):
-    turned = [oriented(part, np.full(len(part), angle)) for part, angle in zip(neighbours, (1, 3), strict=True)]
+    turned = [
+        oriented(part, np.full(len(part), angle))
+        for part, angle in zip(neighbours, (1, 3), strict=True)
+    ]
     found = match_turned(*turned, 2.0, MatchingOptions())
     assert found.dtype == np.uint32
     np.testing.assert_array_equal(found, match(*neighbours, MatchingOptions()))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sfm_front import progress
-from sfm_front.progress import ProgressLine, closing_summary
+from sfm_front.progress import CountLine, ProgressLine, closing_summary
 from sfm_front.types import Skipped, SkipReason, StepReport
 
 
@@ -158,3 +158,35 @@ def test_without_a_model_it_says_what_to_do():
     summary = closing_summary(content(photos, models=0), Path("out"))
     assert summary.startswith("0 of 1 photos registered in 0 models")
     assert "no model could be built" in summary.splitlines()[-1]
+
+
+def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):
+    stream = io.StringIO()
+    line = CountLine("indexing photo", 40, stream)
+    for _ in range(40):
+        turn(0.5)
+        line.count()
+    line.end()
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 10
+    assert lines[0] == "indexing photo 4/40  0.50 s a photo  0:18 left"
+    assert lines[-1].startswith("indexing photo 40/40")
+
+
+def test_counting_on_a_terminal_renews_one_line_and_leaves_none():
+    terminal = Terminal()
+    line = CountLine("indexing photo", 3, terminal)
+    for _ in range(3):
+        line.count()
+    line.end()
+    assert "\n" not in terminal.getvalue()
+    assert "indexing photo 2/3" in terminal.getvalue()
+    assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+def test_counting_a_few_photos_without_a_terminal_names_each():
+    stream = io.StringIO()
+    line = CountLine("photo", 3, stream)
+    for _ in range(3):
+        line.count()
+    assert [text.split()[1] for text in stream.getvalue().splitlines()] == ["1/3", "2/3", "3/3"]

@@ -10,9 +10,10 @@ from photo_stream import no_features, true_matches, view_of
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic import SyntheticScene, make_scene
+from sfm_front.matcher import CpuMatcher
 from sfm_front.matching import MatchingOptions
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
-from sfm_front.types import Candidate, Features
+from sfm_front.types import Candidate
 from sfm_front.verification import Verifier, View
 from sfm_front.workers import Workers
 
@@ -39,7 +40,7 @@ def make_reranker():
         def make(max_features: int = 800, num_threads: int = 1) -> Reranker:
             workers = stack.enter_context(Workers(num_threads))
             options = RerankOptions(max_features=max_features)
-            return Reranker(options, MatchingOptions(), Verifier(), workers)
+            return Reranker(options, CpuMatcher(MatchingOptions(), workers), Verifier(), workers)
 
         yield make
 
@@ -63,19 +64,13 @@ def test_threads_do_not_change_the_ranking(views, make_reranker):
     assert make_reranker(num_threads=3).rerank(views[QUERY], candidates, views) == alone
 
 
-def strongest(view: View, count: int) -> Features:
-    features = view.features
-    parts = features.keypoints, features.descriptors, features.colors
-    return Features(*(part[:count] for part in parts))
-
-
 def test_only_the_strongest_features_are_matched(views, make_reranker):
     candidates = [Candidate(1, 0.5)]
     (few,) = make_reranker(max_features=150).rerank(views[QUERY], candidates, views)
     (many,) = make_reranker().rerank(views[QUERY], candidates, views)
     assert 15 < few.inliers <= 150
     assert few.inliers < many.inliers
-    cut = {index: replace(view, features=strongest(view, 150)) for index, view in views.items()}
+    cut = {i: replace(view, features=view.features.largest(150)) for i, view in views.items()}
     assert make_reranker().rerank(cut[QUERY], candidates, cut) == [few]
 
 
@@ -105,3 +100,16 @@ def test_features_are_matched_by_descriptor_not_by_place(orbit, views, make_rera
     (upright,) = make_reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: view})
     (flipped,) = make_reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: upside_down})
     assert flipped.inliers == pytest.approx(upright.inliers, rel=0.1)
+
+
+def test_it_tells_how_far_candidates_are_turned(views, make_reranker):
+    view = views[1]
+    keypoints = view.features.keypoints.copy()
+    keypoints[:, 3] += 1.0
+    turned = replace(view, features=replace(view.features, keypoints=keypoints))
+    (upright,) = make_reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: view})
+    (further,) = make_reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: turned})
+    assert upright.turn_rad is not None
+    assert further.turn_rad - upright.turn_rad == pytest.approx(1.0, abs=0.01)
+    (stranger,) = make_reranker().rerank(views[QUERY], [Candidate(6, 0.5)], views)
+    assert stranger.turn_rad is None

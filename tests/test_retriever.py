@@ -8,6 +8,7 @@ from photo_stream import described, true_matches
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic import make_scene
 from sfm_front.features.vlad import Vlad
+from sfm_front.matcher import CpuMatcher
 from sfm_front.matching import MatchingOptions
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
@@ -19,7 +20,9 @@ from sfm_front.workers import Workers
 def retriever():
     """It asks for six candidates."""
     with Workers(1) as workers:
-        reranker = Reranker(RerankOptions(), MatchingOptions(), Verifier(), workers)
+        reranker = Reranker(
+            RerankOptions(), CpuMatcher(MatchingOptions(), workers), Verifier(), workers
+        )
         yield Retriever(RetrievalOptions(candidates=6), Vlad().dimension, reranker)
 
 

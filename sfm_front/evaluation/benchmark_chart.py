@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sfm_front.errors import DependencyError, InputError
 from sfm_front.evaluation.benchmark import OURS, SIFT_ALONE, Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _OURS_COLOR, _RIVAL_COLOR, _YARDSTICK_COLOR = "#d1495b", "#7d93a8", "#c9ced6"
 
@@ -48,6 +52,14 @@ def write_chart(rows: Sequence[Row], out: Path) -> None:
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)
     figure.supxlabel("seconds, whole run; in brackets: photos registered", fontsize=8)
+    save_figure(figure, out)
+
+
+def save_figure(figure: Figure, out: Path) -> None:
+    """Write ``figure`` to the file ``out``, in a new folder if need be.
+
+    Raises ``InputError`` where the file cannot be written or its ending is unknown.
+    """
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(out, dpi=160)

@@ -29,11 +29,11 @@ def format_table(rows: Sequence[Row]) -> str:
     ]  # a column that is empty throughout says nothing
     lines = [header, *([line[name] for name in header] for line in cells)]
     widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
-    text = [_aligned(lines[0], widths), "  ".join("-" * width for width in widths)]
+    text = [aligned(lines[0], widths), "  ".join("-" * width for width in widths)]
     for row, before, line in zip(rows, [rows[0], *rows], lines[1:], strict=False):
         if row.scene.name != before.scene.name:
             text.append("")
-        text.append(_aligned(line, widths))
+        text.append(aligned(line, widths))
     text += [f"{row.scene.name}, {row.method}: {reason}" for row in rows for reason in row.failures]
     return "\n".join(text)
 
@@ -99,8 +99,8 @@ def _count(value: float | None, whole: int | None = None) -> str:
     return text if whole is None else f"{text}/{whole}"
 
 
-def _aligned(line: Sequence[str], widths: Sequence[int]) -> str:
-    """Names to the left, numbers to the right."""
+def aligned(line: Sequence[str], widths: Sequence[int]) -> str:
+    """A line of cells, each as wide as given: two names to the left, numbers to the right."""
     return "  ".join(
         text.ljust(width) if column < 2 else text.rjust(width)
         for column, (text, width) in enumerate(zip(line, widths, strict=True))

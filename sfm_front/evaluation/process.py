@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,6 +53,15 @@ def measure(command: Sequence[str], log: Path) -> Measured:
         watcher.join()
     lines = log.read_text(errors="replace").strip().splitlines()
     return Measured(return_code, wall_seconds, peak.bytes, lines[-1].strip() if lines else "")
+
+
+def resident_bytes() -> int | None:
+    """Memory that this process holds now; None where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except OSError:
+        return None
+    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 class _Peak:

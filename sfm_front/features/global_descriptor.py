@@ -26,8 +26,11 @@ NAMES = (*NETWORKS, Vlad.name)
 AUTO_NETWORK = "resnet101_pool5"
 """The network that ``auto`` joins with VLAD where it can: the paper's."""
 
-VLAD_WEIGHT = 0.7
-NETWORK_WEIGHT = 0.3
+# With MobileNetV2, measured as in ``vlad``: mAP 0.912 and 0.931 without it, 0.931 and 0.933 at a
+# weight of 0.1, 0.931 and 0.932 at 0.2, 0.928 and 0.930 at 0.3, 0.924 and 0.926 at 0.4. Recall at
+# 25 is best at 0.2: 0.957, where VLAD alone has 0.941.
+VLAD_WEIGHT = 0.8
+NETWORK_WEIGHT = 0.2
 
 
 Source_contra = TypeVar("Source_contra", contravariant=True)

@@ -58,7 +58,7 @@ class SiftExtractor:
         return Features(
             _to_file_pixels(working, photo),
             root_sift(np.asarray(raw, np.float32)[kept]),
-            _colors_at(photo.pixels, working[:, :2]),
+            colors_at(photo.pixels, working[:, :2]),
         )
 
 
@@ -89,8 +89,7 @@ def _to_file_pixels(working: Float32Array, photo: Photo) -> Float32Array:
 
     OpenCV centres the top-left pixel at (0, 0), COLMAP at (0.5, 0.5).
     """
-    height, width = photo.pixels.shape[:2]
-    scale_x, scale_y = photo.width / width, photo.height / height
+    scale_x, scale_y = enlarged(photo)
     keypoints = np.empty_like(working)
     keypoints[:, 0] = (working[:, 0] + 0.5) * scale_x
     keypoints[:, 1] = (working[:, 1] + 0.5) * scale_y
@@ -99,7 +98,14 @@ def _to_file_pixels(working: Float32Array, photo: Photo) -> Float32Array:
     return keypoints
 
 
-def _colors_at(pixels: Uint8Array, xy: Float32Array) -> Uint8Array:
+def enlarged(photo: Photo) -> tuple[float, float]:
+    """How many times wider and higher the file is than the pixels in memory."""
+    height, width = photo.pixels.shape[:2]
+    return photo.width / width, photo.height / height
+
+
+def colors_at(pixels: Uint8Array, xy: Float32Array) -> Uint8Array:
+    """(N, 3) RGB at (N, 2) places in working pixels, the top-left pixel centred at (0, 0)."""
     height, width = pixels.shape[:2]
     columns = np.clip(np.rint(xy[:, 0]).astype(np.intp), 0, width - 1)
     rows = np.clip(np.rint(xy[:, 1]).astype(np.intp), 0, height - 1)

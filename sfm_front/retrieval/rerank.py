@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sfm_front.errors import ConfigError
-from sfm_front.matching import MatchingOptions, match
+from sfm_front.matcher import Matcher
 from sfm_front.orientation import common_turn
-from sfm_front.types import Candidate
+from sfm_front.types import Candidate, Uint32Array
 from sfm_front.verification import Verifier, View
 from sfm_front.workers import Workers
 
@@ -28,35 +28,31 @@ class Reranker:
     """Counts verified matches between a query and each of its candidates."""
 
     def __init__(
-        self,
-        options: RerankOptions,
-        matching: MatchingOptions,
-        verifier: Verifier,
-        workers: Workers,
+        self, options: RerankOptions, matcher: Matcher, verifier: Verifier, workers: Workers
     ) -> None:
         self._options = options
-        self._matching = matching
+        self._matcher = matcher
         self._verifier = verifier
         self._workers = workers
 
     def rerank(
-        self, query: View, candidates: list[Candidate], views: Mapping[int, View]
+        self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]
     ) -> list[Candidate]:
         """The same candidates with inliers and turn, most inliers first, ties by cosine."""
+        limit = self._options.max_features
+        matches = self._matcher.match(
+            query.features.largest(limit),
+            [views[candidate.image_id].features.largest(limit) for candidate in candidates],
+        )
 
-        def count(candidate: Candidate) -> Candidate:
+        def verify(tentative: tuple[Candidate, Uint32Array]) -> Candidate:
+            candidate, tentative_matches = tentative
             view = views[candidate.image_id]
-            limit = self._options.max_features
-            matches = match(
-                query.features.descriptors[:limit],
-                view.features.descriptors[:limit],
-                self._matching,
-            )
-            inliers = self._verifier.inliers(query, view, matches)
+            inliers = self._verifier.inliers(query, view, tentative_matches)
             turn_rad = common_turn(
                 query.features.keypoints[inliers[:, 0]], view.features.keypoints[inliers[:, 1]]
             )
             return replace(candidate, inliers=len(inliers), turn_rad=turn_rad)
 
-        counted = self._workers.map(count, candidates)
+        counted = self._workers.map(verify, zip(candidates, matches, strict=True))
         return sorted(counted, key=lambda c: (-(c.inliers or 0), -c.cosine))

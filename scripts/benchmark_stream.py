@@ -1,0 +1,118 @@
+"""Measure what a photo costs by its place in a long stream, on a synthetic flight.
+
+Features are given, with known truth: nothing is read or detected, so what is timed is the path of
+a photo from retrieval to mapping.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from sfm_front.config import SessionOptions, available_cores
+from sfm_front.errors import ConfigError, SfmFrontError
+from sfm_front.evaluation.machine import machine
+from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
+from sfm_front.evaluation.stream import PhotoCost, StreamResult, run_stream
+from sfm_front.mapping.atlas import AtlasOptions
+from sfm_front.mapping.mapper import MapperOptions
+from sfm_front.types import StepReport
+
+_MIN_PHOTOS = 200
+
+
+def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--photos", type=int, default=1000, metavar="N", help="(default: 1000)")
+    parser.add_argument("--points", type=int, default=1000, metavar="N", help="in a photo's view")
+    parser.add_argument("--threads", type=int, metavar="N", help="(default: all cores)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every photo's figures")
+    return parser.parse_args(argv)
+
+
+def run(args: argparse.Namespace) -> None:
+    if args.photos < _MIN_PHOTOS:
+        raise ConfigError(f"--photos must be at least {_MIN_PHOTOS}, got {args.photos}")
+    threads = available_cores() if args.threads is None else args.threads
+    options = SessionOptions(
+        global_descriptor="vlad",
+        threads=threads,
+        atlas=AtlasOptions(mapper=MapperOptions(num_threads=threads, seed=args.seed)),
+    )
+    with TemporaryDirectory(prefix="sfm_front_stream_") as output:
+        result = run_stream(
+            args.photos, args.points, Path(output), options, seed=args.seed, note=tell
+        )
+    print(format_result(result))
+    if args.json:
+        content = {"machine": machine(), "threads": threads, **asdict(result)}
+        args.json.parent.mkdir(parents=True, exist_ok=True)
+        args.json.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def tell(step: StepReport) -> None:
+    if step.image_id is not None and step.image_id % 50 == 0:
+        print(
+            f"photo {step.image_id}: {step.num_registered} registered, {step.num_points} points",
+            file=sys.stderr,
+            flush=True,
+        )
+
+
+def format_result(result: StreamResult) -> str:
+    count = len(result.photos)
+    bounds = [*range(0, count, 100), count]
+    lines = ["photos         seconds  with global refinement  memory MiB"]
+    lines += [
+        _line(start, end, result.photos[start:end])
+        for start, end in pairwise(bounds)
+        if end - start > 1
+    ]
+    early, late = slice(100, 200), slice(count - 100, count)
+    areas = ", ".join(
+        f"{100 * area:.1f} at {threshold:g}°"
+        for threshold, area in zip(AUC_THRESHOLDS_DEG, result.auc, strict=True)
+    )
+    per_photo = result.memory_per_photo(100)
+    lines += [
+        f"growth from photos 100-200 to the last 100: "
+        f"{result.growth(early, late, refinement=False):.2f}, "
+        f"with global refinement {result.growth(early, late, refinement=True):.2f}",
+        f"a photo's seconds follow its number to the power {result.exponent(100):.2f}",
+        "memory a photo: " + ("-" if per_photo is None else f"{per_photo / 2**20:.2f} MiB"),
+        f"end of the session: {result.finish_seconds:.1f} s",
+        f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}",
+    ]
+    return "\n".join(lines)
+
+
+def _line(start: int, end: int, photos: Sequence[PhotoCost]) -> str:
+    seconds = np.mean([photo.seconds for photo in photos])
+    refined = np.mean([photo.seconds_with_refinement for photo in photos])
+    memory = photos[-1].memory_bytes
+    shown = "-" if memory is None else f"{memory / 2**20:.0f}"
+    return f"{f'{start}-{end}':<12}{seconds:>10.3f}{refined:>24.3f}{shown:>12}"
+
+
+def main() -> int:
+    try:
+        run(parse())
+    except SfmFrontError as error:
+        print(f"benchmark_stream: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,13 @@
+"""Search a folder by photo: python scripts/retrieve.py FOLDER --query PHOTO [options]."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from sfm_front.cli import main
+
+if __name__ == "__main__":
+    raise SystemExit(main(["retrieve", *sys.argv[1:]]))

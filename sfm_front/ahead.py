@@ -1,0 +1,40 @@
+"""Map a function over items in threads, a bounded number of them ahead of who takes the results."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
+from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def map_ahead(
+    function: Callable[[Item], Result], items: Iterable[Item], *, num_threads: int
+) -> Iterator[Result]:
+    """Results in the items' order, at most ``2 * num_threads`` of them not yet taken.
+
+    Matrix products run on the thread that asks for them meanwhile: split over all cores, they
+    would have the threads wait for each other.
+    """
+    source = iter(items)
+    ahead: deque[Future[Result]] = deque()
+    with (
+        threadpool_limits(1),
+        ThreadPoolExecutor(num_threads, "sfm-ahead", threadpool_limits, (1, "openmp")) as pool,
+    ):
+        try:
+            while True:
+                for item in islice(source, 2 * num_threads - len(ahead)):
+                    ahead.append(pool.submit(function, item))
+                if not ahead:
+                    return
+                yield ahead.popleft().result()
+        finally:
+            for future in ahead:
+                future.cancel()

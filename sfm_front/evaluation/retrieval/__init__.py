@@ -1,0 +1,1 @@
+"""Retrieval measured: datasets, the paper's rivals, mean average precision."""

@@ -1,0 +1,1 @@
+"""Published retrieval datasets in their published layout, and pools of scenes."""

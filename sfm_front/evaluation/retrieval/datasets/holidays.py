@@ -1,0 +1,60 @@
+"""INRIA Holidays: 500 queries among 1491 photos, answers by file number.
+
+Source: Jegou, Douze and Schmid, "Hamming embedding and weak geometric consistency for large scale
+image search", ECCV 2008.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+
+from sfm_front.errors import InputError
+from sfm_front.evaluation.retrieval.datasets.photo_files import (
+    photos_by_stem,
+    require,
+    require_count,
+)
+from sfm_front.evaluation.retrieval.types import Dataset, Query
+
+SOURCE = "https://lear.inrialpes.fr/~jegou/data.php (jpg1.tar.gz and jpg2.tar.gz)"
+NUM_PHOTOS = 1491
+LIST_FILE = "holidays_images.dat"
+
+
+def load(folder: Path) -> tuple[Dataset, ...]:
+    """The dataset unpacked in ``folder``: ``jpg/100000.jpg`` and so on.
+
+    Where the evaluation package's ``holidays_images.dat`` lies beside the photos, it says which
+    there must be. Raises ``InputError`` where photos lack.
+    """
+    photos = photos_by_stem(folder)
+    listed = next(iter(sorted(folder.rglob(LIST_FILE))), None)
+    if listed is None:
+        stems = {stem for stem in photos if stem.isdecimal()}
+        require_count(len(stems), NUM_PHOTOS, folder, "Holidays", SOURCE)
+    else:
+        stems = {Path(line).stem for line in listed.read_text("utf-8").split()}
+        require(photos, stems, folder, "Holidays", SOURCE)
+    names = {f"{stem}.jpg": photos[stem] for stem in sorted(stems)}
+    return (Dataset("holidays", names, queries_of(names)),)
+
+
+def queries_of(names: Iterable[str]) -> tuple[Query, ...]:
+    """``100000.jpg`` asks for the other photos whose number divided by 100 is 1000.
+
+    A photo whose number is divisible by 100 is a query; it is ignored in its own ranking.
+    """
+    groups: dict[int, list[str]] = defaultdict(list)
+    for name in names:
+        stem = Path(name).stem
+        if not stem.isdecimal():
+            raise InputError(f"{name}: photos of Holidays are called by number, as 100000.jpg is")
+        groups[int(stem) // 100].append(name)
+    queries = []
+    for group in groups.values():
+        first, *others = sorted(group)
+        if int(Path(first).stem) % 100 == 0:
+            queries.append(Query(first, first, frozenset(others), frozenset([first])))
+    return tuple(queries)

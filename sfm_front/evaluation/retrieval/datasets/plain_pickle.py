@@ -1,0 +1,67 @@
+"""Read a pickle that holds plain data, and run nothing that it asks for.
+
+A pickle may name any function and have it called while it is read. This reader knows what arrays
+of numpy need and nothing else.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sfm_front.errors import InputError
+
+_RECONSTRUCT = np.zeros(0).__reduce__()[0]
+_SCALAR = np.float64(0).__reduce__()[0]
+
+
+def _bytes_of(text: str, encoding: str) -> bytes:
+    if encoding != "latin1":
+        raise pickle.UnpicklingError(f"it asks for the encoding {encoding}")
+    return text.encode(encoding)
+
+
+def _no_bytes() -> bytes:
+    return b""
+
+
+_ALLOWED: dict[tuple[str, str], Any] = {
+    ("numpy", "ndarray"): np.ndarray,
+    ("numpy", "dtype"): np.dtype,
+    # numpy 2 moved its core: files of either age are read by either.
+    ("numpy.core.multiarray", "_reconstruct"): _RECONSTRUCT,
+    ("numpy._core.multiarray", "_reconstruct"): _RECONSTRUCT,
+    ("numpy.core.multiarray", "scalar"): _SCALAR,
+    ("numpy._core.multiarray", "scalar"): _SCALAR,
+    # Bytes as Python 3 writes them for Python 2.
+    ("_codecs", "encode"): _bytes_of,
+    ("__builtin__", "bytes"): _no_bytes,
+}
+
+
+class _PlainUnpickler(pickle.Unpickler):
+    def find_class(self, module: str, name: str) -> Any:
+        try:
+            return _ALLOWED[module, name]
+        except KeyError:
+            raise pickle.UnpicklingError(f"it asks for {module}.{name}") from None
+
+
+def read_plain_pickle(file: Path) -> Any:
+    """What ``file`` holds: dictionaries, lists, text, numbers and arrays.
+
+    Raises ``InputError`` where it is damaged or holds anything else.
+    """
+    try:
+        # Strings of a pickle written by Python 2 are bytes in any encoding, arrays among them.
+        return _PlainUnpickler(io.BytesIO(file.read_bytes()), encoding="latin1").load()
+    except Exception as error:  # a damaged pickle fails in any way there is
+        reason = str(error) or type(error).__name__
+        raise InputError(
+            f"{file}: not read, because it is damaged or holds more than plain data ({reason}); "
+            "download it again"
+        ) from error

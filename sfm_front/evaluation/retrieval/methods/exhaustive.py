@@ -1,0 +1,43 @@
+"""The yardstick: match the query with every photo, on all features, and verify."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
+from sfm_front.matching import MatchingOptions, match
+from sfm_front.verification import Verifier, View
+from sfm_front.workers import Workers
+
+
+class Exhaustive:
+    """Ranks by the SIFT matches that survive RANSAC on a fundamental matrix, then by matches."""
+
+    name = "exhaustive"
+    global_vectors = ()
+
+    def __init__(self, workers: Workers, *, max_features: int | None = None) -> None:
+        """``max_features``: the largest of each photo that are matched; all by default."""
+        self._max_features = max_features
+        self._matching = MatchingOptions()
+        self._verifier = Verifier()
+        self._workers = workers
+
+    def build(self, photos: Sequence[BenchPhoto]) -> None:
+        self._views = [photo.view for photo in photos]
+
+    def rank(self, query: BenchPhoto) -> list[Ranked]:
+        limit = self._max_features
+
+        def compare(other: View) -> Ranked:
+            matches = match(
+                query.view.features.descriptors[:limit],
+                other.features.descriptors[:limit],
+                self._matching,
+            )
+            inliers = self._verifier.count_inliers(query.view, other, matches)
+            # Fewer than a thousandth of an inlier: matches only break ties.
+            tie_break = len(matches) / (1000 * (1 + len(query.view.features)))
+            return Ranked(other.image_id, inliers + tie_break, inliers=inliers)
+
+        return sorted(self._workers.map(compare, self._views), key=lambda r: -r.score)

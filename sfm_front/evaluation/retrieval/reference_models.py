@@ -1,0 +1,59 @@
+"""Reference models of a pool's scenes: found in a folder, or built there by pycolmap."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from sfm_front.errors import InputError
+from sfm_front.evaluation.benchmark_types import BenchmarkSettings
+from sfm_front.evaluation.retrieval.datasets.pool import Scene
+from sfm_front.evaluation.rivals import run_rival
+from sfm_front.models import find_models
+
+#: The pipeline whose models are the reference: the one that misses no pair.
+PIPELINE = "exhaustive"
+
+
+def with_models(
+    scenes: Sequence[Scene],
+    folder: Path | None,
+    settings: BenchmarkSettings,
+    note: Callable[[str], None],
+) -> tuple[Scene, ...]:
+    """Scenes with a reference model each, where one can be made.
+
+    A scene without any has it below ``folder/SCENE/exhaustive``, where ``benchmark_reconstruction
+    --keep`` leaves it too; if nothing is there, it is built, which takes minutes to hours. Photos
+    of which pycolmap makes no model are left to be distractors; ``note`` is told. Raises
+    ``InputError`` where a scene has no model and ``folder`` is None.
+    """
+    lacking = [scene.name for scene in scenes if not scene.models]
+    if lacking and folder is None:
+        raise InputError(
+            f"no reference model of {', '.join(lacking)}; name a folder to find or build them in: "
+            "--models DIR"
+        )
+    return tuple(
+        scene if scene.models or folder is None else _found_or_built(scene, folder, settings, note)
+        for scene in scenes
+    )
+
+
+def _found_or_built(
+    scene: Scene, folder: Path, settings: BenchmarkSettings, note: Callable[[str], None]
+) -> Scene:
+    home = folder / scene.name / PIPELINE
+    # Built aside, so that what an interrupted run leaves is not taken for a result.
+    unfinished = folder / scene.name / f"{PIPELINE}.unfinished"
+    if not home.is_dir():
+        note(f"{scene.name}: building its reference model by pycolmap's {PIPELINE} pipeline")
+        shutil.rmtree(unfinished, ignore_errors=True)
+        run_rival(PIPELINE, scene.photos, unfinished / "0", settings)
+        unfinished.rename(home)
+    models = tuple(find_models(home))
+    if not models:
+        note(f"{scene.name}: no reference model, so its photos are distractors only ({home})")
+    return replace(scene, models=models)

@@ -1,0 +1,131 @@
+"""What a photo costs by its place in a long stream: a synthetic flight through a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from sfm_front.config import SessionOptions
+from sfm_front.errors import ConfigError
+from sfm_front.evaluation.poses import auc, pose_errors
+from sfm_front.evaluation.process import resident_bytes
+from sfm_front.evaluation.synthetic import SyntheticScene, make_scene
+from sfm_front.features.global_descriptor import resolve
+from sfm_front.session import Session
+from sfm_front.types import DescribedPhoto, Exif, StepReport
+
+_DESCRIPTOR = "vlad"
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoCost:
+    """One photo's wall seconds from retrieval to mapping, global refinement apart and included,
+    and the process's memory after it (None where the system does not tell)."""
+
+    seconds: float
+    seconds_with_refinement: float
+    memory_bytes: int | None
+    num_registered: int
+
+
+@dataclass(frozen=True, slots=True)
+class StreamResult:
+    """``finish_seconds``: the end of the session, export included. ``auc``: of all pairs' poses,
+    at 1, 3 and 5 degrees, from 0 to 1."""
+
+    photos: tuple[PhotoCost, ...]
+    finish_seconds: float
+    num_registered: int
+    auc: tuple[float, ...]
+
+    def growth(self, early: slice, late: slice, *, refinement: bool) -> float:
+        """Mean seconds of the late photos over those of the early ones."""
+        seconds = [
+            photo.seconds_with_refinement if refinement else photo.seconds for photo in self.photos
+        ]
+        return float(np.mean(seconds[late]) / np.mean(seconds[early]))
+
+    def exponent(self, start: int) -> float:
+        """The power of its number that a photo's seconds follow, fitted from ``start`` on, global
+        refinement included: 0 is constant, 1 linear.
+
+        Refinements come in lumps: what is fitted is the sum up to each photo, whose power is one
+        more.
+        """
+        total = np.cumsum([photo.seconds_with_refinement for photo in self.photos])
+        numbers = np.arange(1, len(total) + 1)
+        slope, _ = np.polyfit(np.log(numbers[start:]), np.log(total[start:]), 1)
+        return float(slope) - 1
+
+    def memory_per_photo(self, start: int) -> float | None:
+        """Bytes that each photo from ``start`` on added: the slope of a straight line."""
+        memory = [photo.memory_bytes for photo in self.photos[start:]]
+        known = np.array([value for value in memory if value is not None], np.float64)
+        if len(known) < len(memory) or len(known) < 2:
+            return None
+        slope, _ = np.polyfit(np.arange(len(known)), known, 1)
+        return float(slope)
+
+
+def run_stream(
+    num_photos: int,
+    points_per_image: int,
+    output: Path,
+    options: SessionOptions,
+    *,
+    seed: int,
+    note: Callable[[StepReport], None],
+) -> StreamResult:
+    """Fly in strips over hills and reconstruct from given features; nothing is read or detected.
+
+    ``note`` hears of each photo. Raises ConfigError for fewer than two photos.
+    """
+    if num_photos < 2:
+        raise ConfigError(f"a stream has two photos at least, got {num_photos}")
+    scene = make_scene(num_photos, points_per_image, seed=seed, layout="strip")
+    descriptor, _ = resolve(_DESCRIPTOR)
+    costs: list[PhotoCost] = []
+    with Session(output, options) as session:
+        for index in range(num_photos):
+            features = scene.photo(index).features
+            photo = _described(scene, index, descriptor.describe(np.empty(0, np.uint8), features))
+            started = perf_counter()
+            step = session.take(photo)
+            seconds = perf_counter() - started
+            costs.append(
+                PhotoCost(
+                    seconds - step.seconds.get("refine", 0.0),
+                    seconds,
+                    resident_bytes(),
+                    step.num_registered,
+                )
+            )
+            note(step)
+        started = perf_counter()
+        models = [summary.reconstruction for summary in session.finish()]
+        finish_seconds = perf_counter() - started
+    return StreamResult(
+        photos=tuple(costs),
+        finish_seconds=finish_seconds,
+        num_registered=max((int(model.num_reg_images()) for model in models), default=0),
+        auc=tuple(auc(pose_errors(scene.truth(), models))),
+    )
+
+
+def _described(scene: SyntheticScene, index: int, vector: np.ndarray) -> DescribedPhoto:
+    """Photo ``index`` as if it had been read and described."""
+    photo = scene.photo(index)
+    return DescribedPhoto(
+        name=photo.name,
+        path=Path(photo.name),
+        width=scene.camera.width,
+        height=scene.camera.height,
+        digest=photo.name,
+        exif=Exif(),
+        features=photo.features,
+        global_vector=vector,
+    )

@@ -1,0 +1,48 @@
+"""SIFT by COLMAP itself: the faster one where pycolmap was built with CUDA."""
+
+from __future__ import annotations
+
+from threading import Lock
+
+import numpy as np
+import pycolmap
+
+from sfm_front.features.sift import colors_at, enlarged
+from sfm_front.types import Features, Float32Array, Photo
+
+
+class ColmapSift:
+    """Finds the SIFT keypoints of a photo. Safe to share between threads, which take turns."""
+
+    def __init__(self, max_features: int = 4000, *, on_gpu: bool = True) -> None:
+        """``max_features``: keypoints sought, those of largest scale first; COLMAP keeps the level
+        of scale in which it reaches them whole."""
+        options = pycolmap.FeatureExtractionOptions()
+        options.use_gpu = on_gpu
+        options.num_threads = 1
+        options.sift.max_num_features = max_features
+        device = pycolmap.Device.cuda if on_gpu else pycolmap.Device.cpu
+        self._extractor = pycolmap.FeatureExtractor.create(options, device)
+        self._lock = Lock()
+
+    def extract(self, photo: Photo) -> Features:
+        """Keypoints in pixels of the file, largest first; none in a photo without texture."""
+        bitmap = pycolmap.Bitmap.from_array(photo.pixels).clone_as_grey()
+        with self._lock:
+            found, descriptors = self._extractor.extract(bitmap)
+        working = np.array(
+            [(k.x, k.y, k.compute_scale(), k.compute_orientation()) for k in found], np.float32
+        ).reshape(-1, 4)
+        order = np.argsort(-working[:, 2], kind="stable")
+        working = working[order]
+        return Features(
+            _to_file_pixels(working, photo),
+            np.asarray(descriptors.data, np.uint8).reshape(-1, 128)[order],
+            colors_at(photo.pixels, working[:, :2] - 0.5),
+        )
+
+
+def _to_file_pixels(working: Float32Array, photo: Photo) -> Float32Array:
+    scale_x, scale_y = enlarged(photo)
+    factors = (scale_x, scale_y, np.sqrt(scale_x * scale_y), 1.0)
+    return (working * factors).astype(np.float32)
