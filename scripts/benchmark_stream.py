@@ -73,7 +73,7 @@ def tell(step: StepReport) -> None:
 def format_result(result: StreamResult) -> str:
     count = len(result.photos)
     bounds = [*range(0, count, 100), count]
-    lines = ["photos         seconds  with global refinement  memory MiB"]
+    lines = ["photos         seconds  with refinement  processor's  memory MiB"]
     lines += [
         _line(start, end, result.photos[start:end])
         for start, end in pairwise(bounds)
@@ -85,11 +85,12 @@ def format_result(result: StreamResult) -> str:
         for threshold, area in zip(AUC_THRESHOLDS_DEG, result.auc, strict=True)
     )
     per_photo = result.memory_per_photo(100)
+    growth = result.growth(early, late)
     lines += [
-        f"growth from photos 100-200 to the last 100: "
-        f"{result.growth(early, late, refinement=False):.2f}, "
-        f"with global refinement {result.growth(early, late, refinement=True):.2f}",
-        f"a photo's seconds follow its number to the power {result.exponent(100):.2f}",
+        f"growth from photos 100-200 to the last 100: {growth.seconds:.2f}, "
+        f"with global refinement {growth.seconds_with_refinement:.2f}, "
+        f"of the processor's seconds {growth.processor_seconds:.2f}",
+        f"they follow the photo's number to the power {result.exponent(100):.2f}",
         "memory a photo: " + ("-" if per_photo is None else f"{per_photo / 2**20:.2f} MiB"),
         f"end of the session: {result.finish_seconds:.1f} s",
         f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}",
@@ -100,9 +101,10 @@ def format_result(result: StreamResult) -> str:
 def _line(start: int, end: int, photos: Sequence[PhotoCost]) -> str:
     seconds = np.mean([photo.seconds for photo in photos])
     refined = np.mean([photo.seconds_with_refinement for photo in photos])
+    processor = np.mean([photo.processor_seconds for photo in photos])
     memory = photos[-1].memory_bytes
     shown = "-" if memory is None else f"{memory / 2**20:.0f}"
-    return f"{f'{start}-{end}':<12}{seconds:>10.3f}{refined:>24.3f}{shown:>12}"
+    return f"{f'{start}-{end}':<12}{seconds:>10.3f}{refined:>17.3f}{processor:>13.3f}{shown:>12}"
 
 
 def main() -> int:

@@ -104,6 +104,11 @@ class SceneFeed:
         self.index_of[image_id] = index
         return image_id
 
+    def use_another_camera(self) -> None:
+        """Photos from now on are by a second camera like the first."""
+        self._camera = pycolmap.Camera(self.synthetic.camera.todict())
+        self._camera.camera_id += 1
+
     def add_all(self, indices: Iterable[int]) -> list[int]:
         return [self.add(index) for index in indices]
 

@@ -12,7 +12,7 @@ from photo_stream import SceneFeed, position_errors_m, registered_names, true_pa
 
 from sfm_front.evaluation.synthetic import SyntheticScene, make_scene
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
-from sfm_front.mapping.mapper import MapperOptions
+from sfm_front.mapping.mapper import MapperOptions, Model
 from sfm_front.mapping.scene import Scene
 from sfm_front.types import PairGeometry
 
@@ -79,6 +79,20 @@ def test_photos_with_few_points_are_a_model_when_no_more_will_come():
     assert atlas.models == []
     atlas.finish()
     assert [model.num_registered for model in atlas.models] == [5]
+
+
+def test_a_camera_that_photos_do_not_tell_is_held(orbit, monkeypatch):
+    """Stands in for a flight over flat ground, where focal length and distortion drift away."""
+    monkeypatch.setattr(
+        Model, "is_miscalibrated", property(lambda model: model._options.refine_intrinsics)
+    )
+    feed = SceneFeed(orbit)
+    atlas = run(feed, range(NUM_PHOTOS))
+    atlas.finish()
+    assert_whole(atlas, orbit)
+    camera = atlas.models[0].reconstruction.camera(1)
+    np.testing.assert_array_equal(camera.params, orbit.camera.params)
+    assert [event for event in atlas.take_events() if "the camera held" in event]
 
 
 def test_two_places_are_two_models(orbit):

@@ -102,16 +102,32 @@ def test_a_start_with_few_points_is_rejected(orbit):
     assert not Model(feed.scene, MapperOptions()).initialize(2, 1, many)
 
 
-def test_a_photo_whose_camera_cannot_be_is_not_in_the_finished_model(orbit):
+def two_cameras(orbit, wrong: int) -> tuple[Model, list[int]]:
+    """Eight photos, the last ``wrong`` of them by a second camera; intrinsics are held."""
     feed = SceneFeed(orbit)
-    ids = feed.add_all(range(6))
+    ids = feed.add_all(range(8 - wrong))
+    feed.use_another_camera()
+    ids += feed.add_all(range(8 - wrong, 8))
     model = Model(feed.scene, MapperOptions(num_threads=1, refine_intrinsics=False))
     assert model.initialize(2, 1, DEMANDS)
     model.grow(set(ids) - model.registered)
-    camera = model.reconstruction.camera(1)
-    camera.focal_length = 100 * camera.width
+    assert model.registered == set(ids)
+    model.reconstruction.camera(2).focal_length *= 100
+    return model, ids
+
+
+def test_a_photo_whose_camera_cannot_be_is_not_in_the_finished_model(orbit):
+    model, ids = two_cameras(orbit, wrong=2)
+    assert not model.is_miscalibrated
     model.finish()
-    assert model.registered == set()
+    assert model.registered == set(ids[:-2])
+
+
+def test_a_model_most_of_whose_cameras_cannot_be_says_so_and_keeps_its_photos(orbit):
+    model, ids = two_cameras(orbit, wrong=5)
+    assert model.is_miscalibrated
+    model.finish()
+    assert model.registered == set(ids)
 
 
 def test_photos_that_see_nothing_of_it_are_left_alone(orbit):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 
@@ -23,13 +23,25 @@ _DESCRIPTOR = "vlad"
 
 @dataclass(frozen=True, slots=True)
 class PhotoCost:
-    """One photo's wall seconds from retrieval to mapping, global refinement apart and included,
-    and the process's memory after it (None where the system does not tell)."""
+    """What one photo cost from retrieval to mapping: wall seconds without global refinement and
+    with it, and the processor's seconds, refinement included, which other work on the machine
+    hardly changes. ``memory_bytes``: the process's after it; None where the system does not tell.
+    """
 
     seconds: float
     seconds_with_refinement: float
+    processor_seconds: float
     memory_bytes: int | None
     num_registered: int
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """How many times more late photos cost than early ones, by the figures of ``PhotoCost``."""
+
+    seconds: float
+    seconds_with_refinement: float
+    processor_seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,21 +54,22 @@ class StreamResult:
     num_registered: int
     auc: tuple[float, ...]
 
-    def growth(self, early: slice, late: slice, *, refinement: bool) -> float:
-        """Mean seconds of the late photos over those of the early ones."""
-        seconds = [
-            photo.seconds_with_refinement if refinement else photo.seconds for photo in self.photos
-        ]
-        return float(np.mean(seconds[late]) / np.mean(seconds[early]))
+    def growth(self, early: slice, late: slice) -> Growth:
+        """Means of the late photos over means of the early ones, each figure by itself."""
+        figures = ("seconds", "seconds_with_refinement", "processor_seconds")
+        means = {
+            name: [np.mean([getattr(p, name) for p in self.photos[part]]) for part in (early, late)]
+            for name in figures
+        }
+        return Growth(**{name: float(late / early) for name, (early, late) in means.items()})
 
     def exponent(self, start: int) -> float:
-        """The power of its number that a photo's seconds follow, fitted from ``start`` on, global
-        refinement included: 0 is constant, 1 linear.
+        """The power of its number that a photo's cost follows, fitted from ``start`` on.
 
-        Refinements come in lumps: what is fitted is the sum up to each photo, whose power is one
-        more.
+        0 is constant, 1 linear. Of the processor's seconds. Refinements come in lumps: what is
+        fitted is the sum up to each photo, whose power is one more.
         """
-        total = np.cumsum([photo.seconds_with_refinement for photo in self.photos])
+        total = np.cumsum([photo.processor_seconds for photo in self.photos])
         numbers = np.arange(1, len(total) + 1)
         slope, _ = np.polyfit(np.log(numbers[start:]), np.log(total[start:]), 1)
         return float(slope) - 1
@@ -93,13 +106,14 @@ def run_stream(
         for index in range(num_photos):
             features = scene.photo(index).features
             photo = _described(scene, index, descriptor.describe(np.empty(0, np.uint8), features))
-            started = perf_counter()
+            started, processor_started = perf_counter(), process_time()
             step = session.take(photo)
             seconds = perf_counter() - started
             costs.append(
                 PhotoCost(
                     seconds - step.seconds.get("refine", 0.0),
                     seconds,
+                    process_time() - processor_started,
                     resident_bytes(),
                     step.num_registered,
                 )
