@@ -118,13 +118,15 @@ class Atlas:
         """Grow every model, the largest first; True if any grew."""
         grew = False
         for model in list(self.models):
-            if model is self.models[0]:
-                candidates = set(self._scene.image_ids) - model.registered
-            else:
-                candidates = set(self.waiting)
-            grew |= bool(model.grow(candidates))
+            grew |= bool(model.grow(self._candidates(model)))
         self._join()
         return grew
+
+    def _candidates(self, model: Model) -> set[int]:
+        """Photos that a model may take: the largest those of smaller models, too."""
+        if model is self.models[0]:
+            return set(self._scene.image_ids) - model.registered
+        return set(self.waiting)
 
     def _join(self) -> None:
         """Sort models by size and drop those that larger ones hold."""
@@ -241,7 +243,9 @@ class Atlas:
 
     def _place_without_structure(self) -> bool:
         """Register by two-view geometry alone what sees too few points; True if any was."""
-        placed = [i for model in self.models for i in model.grow_without_structure(self.waiting)]
+        placed: list[int] = []
+        for model in self.models:
+            placed += model.grow_without_structure(self._candidates(model))
         if placed:
             self._events.append(f"{len(placed)} photos registered without structure")
         return bool(placed)
