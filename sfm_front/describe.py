@@ -6,11 +6,11 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
-from types import TracebackType
 from typing import Protocol
 
 import cv2
 
+from sfm_front.closing import Closing
 from sfm_front.features.global_descriptor import GlobalDescriptor
 from sfm_front.images import PhotoReader
 from sfm_front.source import PhotoPath
@@ -24,7 +24,7 @@ class FeatureExtractor(Protocol):
     def extract(self, photo: Photo) -> Features: ...
 
 
-class PhotoDescriber:
+class PhotoDescriber(Closing):
     """Reads photos and describes them, several at a time.
 
     Of one photo, SIFT and the global vector's pixel share are computed in two parallel threads,
@@ -102,14 +102,3 @@ class PhotoDescriber:
     def close(self) -> None:
         self._photos.shutdown(cancel_futures=True)
         self._networks.shutdown(cancel_futures=True)
-
-    def __enter__(self) -> PhotoDescriber:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()

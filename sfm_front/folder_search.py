@@ -16,7 +16,7 @@ from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
 from sfm_front.source import PhotoPath
 from sfm_front.stopwatch import Stopwatch
-from sfm_front.types import DescribedPhoto, Float64Array, PairGeometry
+from sfm_front.types import Candidate, DescribedPhoto, Float64Array, PairGeometry
 from sfm_front.verification import Verifier
 from sfm_front.workers import Workers
 
@@ -105,8 +105,7 @@ class FolderSearch:
         clock = Stopwatch()
         query_id = self._ids.get(query.path.resolve(), _NOT_INDEXED)
         with clock.stage("coarse"):
-            ranked = self._cosines.query(query.global_vector, len(self._cosines))
-            ranked = [candidate for candidate in ranked if candidate.image_id != query_id]
+            ranked = self._coarse(query, query_id)
         count = self._num_reranked()
         with clock.stage("read"):
             proposed = [candidate.image_id for candidate in ranked[:count]]
@@ -118,6 +117,20 @@ class FolderSearch:
             Found(self._index.photos[c.image_id], c.image_id, c.cosine, c.inliers) for c in ranked
         )
         return Answer(PhotoPath(query.name, query.path), found, clock.seconds)
+
+    def _coarse(self, query: DescribedPhoto, query_id: int) -> list[Candidate]:
+        """All photos but the query's own: those to be re-ranked, then the others by cosine."""
+        options = self._options.retrieval
+        proposed: list[Candidate] = []
+        if self._options.method == "ours":
+            # One more: the query may be among them.
+            proposed = self._cosines.query(
+                query.global_vector, options.candidates + 1, widen_by=options.widen_by
+            )
+            proposed = [c for c in proposed if c.image_id != query_id][: options.candidates]
+        left_out = {query_id, *(candidate.image_id for candidate in proposed)}
+        everything = self._cosines.query(query.global_vector, len(self._cosines))
+        return proposed + [c for c in everything if c.image_id not in left_out]
 
     def verified_matches(self, query: DescribedPhoto, other: DescribedPhoto) -> VerifiedMatches:
         """Match two photos on all features, and verify; no match is left if they are rejected."""

@@ -11,13 +11,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
+from sfm_front.closing import Closing
 from sfm_front.types import STAGES_AHEAD, ModelSummary, StepReport
 
 
-class Report:
+class Report(Closing):
     """Collects what became of each photo and writes it down."""
 
     def __init__(self, output: Path) -> None:
@@ -89,17 +89,6 @@ class Report:
 
     def close(self) -> None:
         self._retrieval.close()
-
-    def __enter__(self) -> Report:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _row(
         self, step: StepReport, model_of: Mapping[int, int], why_not: Mapping[int, str]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from types import TracebackType
 
 import pycolmap
 
 from sfm_front.cameras import CameraCatalog
+from sfm_front.closing import Closing
 from sfm_front.config import SessionOptions
 from sfm_front.describe import FeatureExtractor, PhotoDescriber
 from sfm_front.devices import usable_device
@@ -45,7 +45,7 @@ from sfm_front.workers import Workers
 _OUTPUTS = ("database.db", "database.db-shm", "database.db-wal", "retrieval.jsonl", "report.json")
 
 
-class Session:
+class Session(Closing):
     """Reconstructs photos that arrive one at a time.
 
     ::
@@ -155,17 +155,6 @@ class Session:
         self._workers.close()
         self._store.close()
         self._report.close()
-
-    def __enter__(self) -> Session:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _place(self, photo: DescribedPhoto) -> StepReport:
         """The method: retrieve, verify, store, map, remember."""

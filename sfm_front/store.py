@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 import pycolmap
 
+from sfm_front.closing import Closing
 from sfm_front.types import DescribedPhoto, GeoPosition, PairGeometry
 
 
-class Store:
+class Store(Closing):
     """Writes photos to a COLMAP database that COLMAP's own tools can go on with."""
 
     def __init__(self, path: Path) -> None:
@@ -58,17 +58,6 @@ class Store:
 
     def close(self) -> None:
         self._database.close()
-
-    def __enter__(self) -> Store:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _pose_prior(image: pycolmap.Image, position: GeoPosition) -> pycolmap.PosePrior:

@@ -17,13 +17,17 @@ from sfm_front.verification import View
 
 @dataclass(frozen=True, kw_only=True)
 class RetrievalOptions:
-    """``candidates``: photos that the global vectors propose."""
+    """``candidates``: photos that the global vectors propose. ``widen_by``: so many of the best
+    are added to the query before, see ``CosineIndex.query``."""
 
     candidates: int = 25
+    widen_by: int = 5
 
     def __post_init__(self) -> None:
         if self.candidates < 1:
             raise ConfigError(f"candidates must be at least 1, got {self.candidates}")
+        if self.widen_by < 0:
+            raise ConfigError(f"widen_by must not be negative, got {self.widen_by}")
 
 
 class Retriever:
@@ -36,8 +40,9 @@ class Retriever:
         self._views: dict[int, View] = {}
 
     def candidates(self, vector: Float32Array) -> list[Candidate]:
-        """The coarse step: photos by cosine with a (dimension,) global vector, best first."""
-        return self._index.query(vector, self._options.candidates)
+        """The coarse step: photos by a (dimension,) global vector and its best, best first."""
+        options = self._options
+        return self._index.query(vector, options.candidates, widen_by=options.widen_by)
 
     def rerank(self, query: View, candidates: list[Candidate]) -> list[Candidate]:
         """The fine step: candidates by verified matches; the first is the most relevant photo."""

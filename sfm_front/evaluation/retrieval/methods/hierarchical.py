@@ -59,7 +59,11 @@ class Hierarchical:
         """The candidates alone, best first: what a photo costs in a reconstruction."""
         clock = Stopwatch()
         with clock.stage("coarse"):
-            proposed = self._index.query(query.vectors[self.vector], self._retrieval.candidates)
+            proposed = self._index.query(
+                query.vectors[self.vector],
+                self._retrieval.candidates,
+                widen_by=self._retrieval.widen_by,
+            )
         with clock.stage("fine"):
             ranked = self._reranker.rerank(query.view, proposed, self._views)
         self.seconds = clock.seconds
