@@ -86,13 +86,23 @@ def test_a_camera_that_photos_do_not_tell_is_held(orbit, monkeypatch):
     monkeypatch.setattr(
         Model, "is_miscalibrated", property(lambda model: model._options.refine_intrinsics)
     )
+    other = make_scene(NUM_PHOTOS, 500, seed=5, layout="orbit")
     feed = SceneFeed(orbit)
     atlas = run(feed, range(NUM_PHOTOS))
+    elsewhere = SceneFeed(other, feed.scene, prefix="b/")
+    for index in range(8):
+        atlas.add(elsewhere.add(index))
     atlas.finish()
-    assert_whole(atlas, orbit)
-    camera = atlas.models[0].reconstruction.camera(1)
-    np.testing.assert_array_equal(camera.params, orbit.camera.params)
-    assert [event for event in atlas.take_events() if "the camera held" in event]
+    assert [model.registered for model in atlas.models] == [
+        set(feed.index_of),
+        set(elsewhere.index_of),
+    ]
+    assert position_errors_m(atlas.models[0].reconstruction, orbit).max() < POSITION_TOLERANCE_M
+    for model in atlas.models:
+        camera = model.reconstruction.camera(1)
+        np.testing.assert_array_equal(camera.params, orbit.camera.params)
+    held = [event for event in atlas.take_events() if "the camera held" in event]
+    assert len(held) == 2
 
 
 def test_two_places_are_two_models(orbit):

@@ -50,7 +50,7 @@ def test_it_grows_over_all_photos_and_their_poses_are_true(orbit):
     feed = SceneFeed(orbit)
     ids = feed.add_all(range(14))
     model = started(feed)
-    placed = model.grow(set(ids) - model.registered)
+    placed = model.grow(ids)
     assert sorted(placed) == ids[2:]
     assert model.registered == set(ids)
     model.refine()
@@ -70,11 +70,11 @@ def test_it_grows_photo_by_photo_as_they_arrive(orbit):
         before = model.registered
         image_id = feed.add(index)
         model.extend(image_id)
-        model.grow(set(range(1, image_id + 1)) - before)
+        model.grow(range(1, image_id + 1))
         model.refine()
         assert before <= model.registered
     model.forget_failures()
-    model.grow(set(range(1, 15)) - model.registered)
+    model.grow(range(1, 15))
     model.refine()
     assert model.registered == set(range(1, 15))
     assert position_errors_m(model.reconstruction, orbit).max() < POSITION_TOLERANCE_M

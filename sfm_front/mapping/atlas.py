@@ -104,8 +104,8 @@ class Atlas:
         """Retry what waits, start afresh where the stream began badly, refine everything."""
         self._settle()
         self._start_afresh()
-        self._hold_cameras()
         self._start_leftovers()
+        self._hold_cameras()
         self._drop_small()
         while self._place_without_structure():
             self._settle()
@@ -122,11 +122,11 @@ class Atlas:
         self._join()
         return grew
 
-    def _candidates(self, model: Model) -> set[int]:
+    def _candidates(self, model: Model) -> list[int]:
         """Photos that a model may take: the largest those of smaller models, too."""
         if model is self.models[0]:
-            return set(self._scene.image_ids) - model.registered
-        return set(self.waiting)
+            return self._scene.image_ids
+        return self.waiting
 
     def _join(self) -> None:
         """Sort models by size and drop those that larger ones hold."""
@@ -174,7 +174,7 @@ class Atlas:
             largest = self.models[0] if self.models else None
             if largest is not None and not self._misses(largest):
                 return
-            fresh.grow(set(self._scene.image_ids))
+            fresh.grow(self._scene.image_ids)
             if largest is None or fresh.num_registered > largest.num_registered:
                 self._events.append(f"grown afresh: {event}")
                 self.models.insert(0, fresh)
@@ -189,21 +189,22 @@ class Atlas:
         """Grow models anew whose photos do not tell what their camera is, with what EXIF says.
 
         A nadir flight over flat ground leaves focal length and distortion open. On
-        ``uav_garfield_rgb`` they ended at 23 times the EXIF focal length, and the photos 62 m
+        ``uav_garfield_rgb`` they have ended at 23 times the EXIF focal length, and the photos 62 m
         from GPS in the median, on a site of 185 m; with the camera held 13 m.
         """
+        miscalibrated = [model for model in self.models if model.is_miscalibrated]
         held = replace(self._options.mapper, refine_intrinsics=False)
         initializer = Initializer(self._scene, self._options.initialization, held, self._clock)
-        for index, model in enumerate(self.models):
-            if not model.is_miscalibrated:
+        for model in miscalibrated:
+            best = self._best_start(model.registered, initializer)
+            if best is None:
                 continue
-            for fresh, event in initializer.best_starts(self._options.fresh_starts):
-                fresh.grow(model.registered)
-                if fresh.num_registered >= self._options.min_share * model.num_registered:
-                    self._events.append(f"grown afresh, the camera held as EXIF has it: {event}")
-                    self.models[index] = fresh
-                    self._settle()
-                    return
+            fresh, event = best
+            if fresh.num_registered >= self._options.min_share * model.num_registered:
+                self._events.append(f"grown afresh, the camera held as EXIF has it: {event}")
+                self.models[self.models.index(model)] = fresh
+        if miscalibrated:
+            self._settle()
 
     def _misses(self, model: Model) -> bool:
         """Whether photos linked to a model are in none, or too many in others."""
@@ -222,17 +223,19 @@ class Atlas:
             seen |= group
             if len(group) < self._options.min_model_size:
                 continue
-            best = self._best_start(group)
+            best = self._best_start(group, self._initializer)
             if best is not None:
                 model, event = best
                 self._events.append(event)
                 self.models.append(model)
                 self._settle()
 
-    def _best_start(self, group: Collection[int]) -> tuple[Model, str] | None:
+    def _best_start(
+        self, group: Collection[int], initializer: Initializer
+    ) -> tuple[Model, str] | None:
         """Of the models that start within a group, the first to hold most of it, or the largest."""
         best: tuple[Model, str] | None = None
-        while (started := self._initializer.start(group, last_call=True)) is not None:
+        while (started := initializer.start(group, last_call=True)) is not None:
             model, _ = started
             model.grow(group)
             if best is None or _size(model) > _size(best[0]):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import pycolmap
@@ -160,13 +160,13 @@ class Model:
         self._note_refined()
         return True
 
-    def grow(self, waiting: Collection[int]) -> list[int]:
-        """Register every photo that sees enough of the model; the best placed one first.
+    def grow(self, photos: Iterable[int]) -> list[int]:
+        """Register every one of these that sees enough of the model; the best placed one first.
 
-        Returns the image ids in order of registration.
+        Those that are in it are passed over. Returns the image ids in order of registration.
         """
         placed: list[int] = []
-        left = set(waiting)
+        left = set(photos) - self.registered
         while (image_id := self._best(left)) is not None:
             left.discard(image_id)
             if self._register(image_id):
@@ -176,10 +176,13 @@ class Model:
                     self._refine(self._streaming)
         return placed
 
-    def grow_without_structure(self, waiting: Iterable[int]) -> list[int]:
-        """Register photos by their matches to registered ones where no 3-D points are seen."""
+    def grow_without_structure(self, photos: Iterable[int]) -> list[int]:
+        """Register photos by their matches to registered ones where no 3-D points are seen.
+
+        Those that are in the model are passed over, as in ``grow``.
+        """
         placed: list[int] = []
-        for image_id in sorted(waiting):
+        for image_id in sorted(set(photos) - self.registered):
             if not self._scene.neighbors(image_id).keys() & self.registered:
                 continue
             if self._mapper.register_next_structure_less_image(self._mapping, image_id):
