@@ -17,12 +17,12 @@ class Matcher(Protocol):
         self,
         query: Features,
         others: Sequence[Features],
-        turns_rad: Sequence[float | None] | None = None,
+        turns_rad: Sequence[float | None],
     ) -> list[Uint32Array]:
         """For each other photo (K, 2) uint32: keypoint indices in the query and in the other.
 
         ``turns_rad``: how far each other is turned against the query, so that only features that
-        agree with it meet; None, for all or for one, where that is not known.
+        agree with it meet; None where that is not known.
         """
         ...
 
@@ -38,7 +38,7 @@ class CpuMatcher:
         self,
         query: Features,
         others: Sequence[Features],
-        turns_rad: Sequence[float | None] | None = None,
+        turns_rad: Sequence[float | None],
     ) -> list[Uint32Array]:
         """See ``Matcher``."""
 
@@ -48,7 +48,6 @@ class CpuMatcher:
                 return match(query.descriptors, other.descriptors, self._options)
             return match_turned(query, other, turn_rad, self._options)
 
-        turns_rad = turns_rad or [None] * len(others)
         return self._workers.map(match_one, zip(others, turns_rad, strict=True))
 
 

@@ -35,10 +35,9 @@ class TorchMatcher:
         self,
         query: Features,
         others: Sequence[Features],
-        turns_rad: Sequence[float | None] | None = None,
+        turns_rad: Sequence[float | None],
     ) -> list[Uint32Array]:
         """See ``matcher.Matcher``."""
-        turns_rad = turns_rad or [None] * len(others)
         if len(query) < 2:
             return [NO_MATCHES] * len(others)
         longest = max((len(other) for other in others), default=1)

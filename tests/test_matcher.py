@@ -28,7 +28,7 @@ def test_each_pair_is_matched_as_it_is_alone(photos, num_threads):
     query, *others = photos
     with Workers(num_threads) as workers:
         matcher = CpuMatcher(OPTIONS, workers)
-        everything = matcher.match(query, others)
+        everything = matcher.match(query, others, [None] * len(others))
         found = matcher.match(query, others, TURNS_RAD)
     assert len(everything[0]) > 50
     for matches, other in zip(everything, others, strict=True):
@@ -45,7 +45,7 @@ def test_torch_finds_the_same(photos, at_once, monkeypatch):
     torch_matcher = TorchMatcher(OPTIONS, "cpu")
     with Workers(1) as workers:
         cpu_matcher = CpuMatcher(OPTIONS, workers)
-        for turns_rad in (None, TURNS_RAD):
+        for turns_rad in ([None] * len(others), TURNS_RAD):
             expected = cpu_matcher.match(query, others, turns_rad)
             found = torch_matcher.match(query, others, turns_rad)
             assert sum(map(len, expected)) > 50
@@ -59,7 +59,7 @@ def test_photos_without_features_match_nothing_anywhere(photos, turn_rad):
     empty = no_features()
     with Workers(1) as workers:
         for matcher in (CpuMatcher(OPTIONS, workers), TorchMatcher(OPTIONS, "cpu")):
-            assert matcher.match(photos[0], []) == []
+            assert matcher.match(photos[0], [], []) == []
             for query, other in ((photos[0], empty), (empty, photos[0]), (empty, empty)):
                 (matches,) = matcher.match(query, [other], [turn_rad])
                 assert matches.shape == (0, 2)

@@ -28,9 +28,9 @@ class Recorder:
         self,
         query: Features,
         others: Sequence[Features],
-        turns_rad: Sequence[float | None] | None = None,
+        turns_rad: Sequence[float | None],
     ) -> list[Uint32Array]:
-        turned = turns_rad is not None and all(turn is not None for turn in turns_rad)
+        turned = None not in turns_rad
         self.asked.append((len(query), len(others), turned))
         return self._matcher.match(query, others, turns_rad)
 

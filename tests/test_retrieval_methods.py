@@ -13,7 +13,6 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.retrieval.describe import BenchDescriber
 from sfm_front.evaluation.retrieval.methods import METHODS, make_method
 from sfm_front.evaluation.retrieval.methods.bag_of_words import BagOfWords, InvertedFile
-from sfm_front.evaluation.retrieval.methods.exhaustive import Exhaustive
 from sfm_front.evaluation.retrieval.methods.hierarchical import Hierarchical
 from sfm_front.evaluation.retrieval.methods.joined import Joined
 from sfm_front.evaluation.retrieval.methods.perceptual import ByPerceptualHash
@@ -135,15 +134,6 @@ def test_hashes_are_ranked_by_equal_bits(world):
         (photos[2].view.image_id, 1 - 1 / 64),
         (photos[0].view.image_id, 1 - 7 / 64),
     ]
-
-
-def test_exhaustive_uses_as_many_features_as_it_may(world, workers):
-    def inliers(max_features: int | None) -> int:
-        method = Exhaustive(workers, max_features=max_features)
-        method.build(world.photos)
-        return method.rank(world.query)[0].inliers
-
-    assert inliers(None) > inliers(100) > 15
 
 
 def test_ours_ranks_candidates_by_inliers_and_the_rest_by_cosine(world, workers):

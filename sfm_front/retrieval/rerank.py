@@ -43,6 +43,7 @@ class Reranker:
         matches = self._matcher.match(
             query.features.largest(limit),
             [views[candidate.image_id].features.largest(limit) for candidate in candidates],
+            [None] * len(candidates),
         )
 
         def verify(tentative: tuple[Candidate, Uint32Array]) -> Candidate:

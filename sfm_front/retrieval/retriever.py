@@ -37,7 +37,8 @@ class Retriever:
         self._options = options
         self._index = CosineIndex(dimension)
         self._reranker = reranker
-        self._views: dict[int, View] = {}
+        self.views: dict[int, View] = {}
+        """The photos it remembers, by image id."""
 
     def candidates(self, vector: Float32Array) -> list[Candidate]:
         """The coarse step: photos by a (dimension,) global vector and its best, best first."""
@@ -46,9 +47,9 @@ class Retriever:
 
     def rerank(self, query: View, candidates: list[Candidate]) -> list[Candidate]:
         """The fine step: candidates by verified matches; the first is the most relevant photo."""
-        return self._reranker.rerank(query, candidates, self._views)
+        return self._reranker.rerank(query, candidates, self.views)
 
     def remember(self, view: View, vector: Float32Array) -> None:
         """Let later photos find this one."""
         self._index.add(view.image_id, vector)
-        self._views[view.image_id] = view
+        self.views[view.image_id] = view

@@ -16,9 +16,7 @@ class Exhaustive:
     name = "exhaustive"
     global_vectors = ()
 
-    def __init__(self, workers: Workers, *, max_features: int | None = None) -> None:
-        """``max_features``: the largest of each photo that are matched; all by default."""
-        self._max_features = max_features
+    def __init__(self, workers: Workers) -> None:
         self._matching = MatchingOptions()
         self._verifier = Verifier()
         self._workers = workers
@@ -27,13 +25,9 @@ class Exhaustive:
         self._views = [photo.view for photo in photos]
 
     def rank(self, query: BenchPhoto) -> list[Ranked]:
-        limit = self._max_features
-
         def compare(other: View) -> Ranked:
             matches = match(
-                query.view.features.descriptors[:limit],
-                other.features.descriptors[:limit],
-                self._matching,
+                query.view.features.descriptors, other.features.descriptors, self._matching
             )
             inliers = self._verifier.count_inliers(query.view, other, matches)
             # Fewer than a thousandth of an inlier: matches only break ties.
