@@ -6,13 +6,11 @@ A FOLDER holds photos, or has them in its images/. Ground truth is looked for in
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -25,6 +23,7 @@ from sfm_front.evaluation.benchmark_types import CAMERA_MODES, BenchmarkSettings
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.rivals import RIVALS
 from sfm_front.evaluation.scenes import BenchmarkScene, find_scene
+from sfm_front.json_files import write_json
 
 RECONSTRUCT = [sys.executable, str(Path(__file__).resolve().parent / "reconstruct.py")]
 
@@ -94,7 +93,12 @@ def run(args: argparse.Namespace) -> None:
             if row.method == OURS:
                 print("\n" + format_profile(row))
     if args.json:
-        write_json(args.json, settings, rows)
+        content = {
+            "settings": asdict(settings),
+            "machine": machine(),
+            "rows": [row.as_dict() for row in rows],
+        }
+        write_json(args.json, content)
     if args.figure:
         write_chart(rows, args.figure)
 
@@ -115,16 +119,6 @@ def check(args: argparse.Namespace, rivals: list[str], scenes: list[BenchmarkSce
         raise InputError(f"{args.keep}: not empty; give a new folder to --keep")
     if args.figure:
         check_matplotlib()
-
-
-def write_json(out: Path, settings: BenchmarkSettings, rows: Sequence[Row]) -> None:
-    content: dict[str, Any] = {
-        "settings": asdict(settings),
-        "machine": machine(),
-        "rows": [row.as_dict() for row in rows],
-    }
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(json.dumps(content, indent=1, ensure_ascii=False), encoding="utf-8")
 
 
 def main() -> int:

@@ -8,7 +8,6 @@ paris6k, roxford5k, rparis6k: the published datasets, photos and ground truth as
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -28,6 +27,7 @@ from sfm_front.evaluation.retrieval.methods import METHODS
 from sfm_front.evaluation.retrieval.run import OURS, RetrievalSettings, run
 from sfm_front.evaluation.retrieval.table import format_table, write_csv
 from sfm_front.features.cnn import NETWORKS
+from sfm_front.json_files import write_json
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
 
@@ -129,8 +129,7 @@ def benchmark(args: argparse.Namespace) -> None:
             "machine": machine(),
             "outcomes": [outcome.as_dict() for outcome in outcomes],
         }
-        args.json.parent.mkdir(parents=True, exist_ok=True)
-        args.json.write_text(json.dumps(content, indent=1, default=str), encoding="utf-8")
+        write_json(args.json, content)
     if args.figure:
         methods = {outcome.method for outcome in outcomes}
         write_chart(

@@ -7,7 +7,6 @@ a photo from retrieval to mapping.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -24,6 +23,7 @@ from sfm_front.errors import ConfigError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
 from sfm_front.evaluation.stream import PhotoCost, StreamResult, run_stream
+from sfm_front.json_files import write_json
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.mapper import MapperOptions
 from sfm_front.types import StepReport
@@ -56,9 +56,7 @@ def run(args: argparse.Namespace) -> None:
         )
     print(format_result(result))
     if args.json:
-        content = {"machine": machine(), "threads": threads, **asdict(result)}
-        args.json.parent.mkdir(parents=True, exist_ok=True)
-        args.json.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        write_json(args.json, {"machine": machine(), "threads": threads, **asdict(result)})
 
 
 def tell(step: StepReport) -> None:

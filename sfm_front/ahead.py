@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import islice
 from typing import TypeVar
 
+import cv2
 from threadpoolctl import threadpool_limits
 
 Item = TypeVar("Item")
@@ -16,16 +18,16 @@ Result = TypeVar("Result")
 
 def map_ahead(
     function: Callable[[Item], Result], items: Iterable[Item], *, num_threads: int
-) -> Iterator[Result]:
+) -> Generator[Result, None, None]:
     """Results in the items' order, at most ``2 * num_threads`` of them not yet taken.
 
-    Matrix products run on the thread that asks for them meanwhile: split over all cores, they
-    would have the threads wait for each other.
+    Until the last one, or until it is closed, matrix products and OpenCV run on the thread that
+    asks for them: split over all cores, they would have the threads wait for each other.
     """
     source = iter(items)
     ahead: deque[Future[Result]] = deque()
     with (
-        threadpool_limits(1),
+        _undivided_calls(),
         ThreadPoolExecutor(num_threads, "sfm-ahead", threadpool_limits, (1, "openmp")) as pool,
     ):
         try:
@@ -38,3 +40,14 @@ def map_ahead(
         finally:
             for future in ahead:
                 future.cancel()
+
+
+@contextmanager
+def _undivided_calls() -> Iterator[None]:
+    opencv_threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        cv2.setNumThreads(opencv_threads)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import stat
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from sfm_front.ahead import map_ahead
@@ -21,7 +18,7 @@ from sfm_front.description_files import (
 )
 from sfm_front.features.global_descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
-from sfm_front.images import PhotoReader
+from sfm_front.images import PhotoReader, file_digest
 from sfm_front.source import PhotoPath
 from sfm_front.types import DescribedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
 
@@ -63,10 +60,10 @@ class CachedDescriber:
     ) -> Recalled | Skipped:
         """Describe a photo, or the part of it in ``box``; keypoints are those of the whole file.
 
-        ``digest``: what ``file_digest`` gives, where it is known already. Raises InputError where
+        ``digest``: that of the file, where it is known already. Raises InputError where
         the folder cannot be written to.
         """
-        known = digest or file_digest(photo)
+        known = digest or file_digest(photo.path, photo.name)
         if isinstance(known, Skipped):
             return known
         digest = known
@@ -102,13 +99,7 @@ class CachedDescriber:
         def describe(photo: PhotoPath) -> Recalled | Skipped:
             return self.describe(photo, None if boxes is None else boxes.get(photo.name))
 
-        # Whole photos side by side use the cores better than OpenCV's splitting of each.
-        threads_before = cv2.getNumThreads()
-        cv2.setNumThreads(1)
-        try:
-            yield from map_ahead(describe, photos, num_threads=num_threads)
-        finally:
-            cv2.setNumThreads(threads_before)
+        return map_ahead(describe, photos, num_threads=num_threads)
 
     def _make(
         self, photo: PhotoPath, box: Box | None, keys: ContentKeys
@@ -133,21 +124,6 @@ class CachedDescriber:
                 self.files.save_vector(key, vector)
             vectors.append(vector)
         return local, vectors
-
-
-def file_digest(photo: PhotoPath) -> str | Skipped:
-    """What identifies the bytes of a photo's file: 32 hexadecimal digits, as in ``Photo``."""
-    try:
-        # Opening a pipe would wait for ever.
-        if not stat.S_ISREG(photo.path.stat().st_mode):
-            return Skipped(photo.name, SkipReason.UNREADABLE, "not a regular file")
-        digest = hashlib.blake2b(digest_size=16)
-        with photo.path.open("rb") as file:
-            while chunk := file.read(1 << 20):
-                digest.update(chunk)
-    except OSError as error:
-        return Skipped(photo.name, SkipReason.UNREADABLE, error.strerror or str(error))
-    return digest.hexdigest()
 
 
 def crop(photo: Photo, box: Box) -> tuple[Photo, tuple[float, float]]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import islice
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
+from weakref import WeakSet
 
-import cv2
-
+from sfm_front.ahead import map_ahead
 from sfm_front.closing import Closing
 from sfm_front.features.global_descriptor import GlobalDescriptor
 from sfm_front.images import PhotoReader
@@ -44,8 +42,8 @@ class PhotoDescriber(Closing):
         self._sift = sift
         self._global = global_descriptor
         self._num_threads = num_threads
-        self._photos = ThreadPoolExecutor(num_threads, "sfm-describe")
         self._networks = ThreadPoolExecutor(1, "sfm-network")
+        self._streams: WeakSet[Generator[DescribedPhoto | Skipped, None, None]] = WeakSet()
 
     def describe(self, photo: PhotoPath) -> DescribedPhoto | Skipped:
         """Read one photo and describe it in the calling thread, networks in a second one."""
@@ -76,22 +74,9 @@ class PhotoDescriber(Closing):
 
     def stream(self, photos: Iterable[PhotoPath]) -> Iterator[DescribedPhoto | Skipped]:
         """Describe photos in order, up to twice as many ahead as are worked on at a time."""
-        source = iter(photos)
-        # Whole photos side by side use the cores better than OpenCV's splitting of each.
-        threads_before = cv2.getNumThreads()
-        cv2.setNumThreads(1)
-        ahead: deque[Future[DescribedPhoto | Skipped]] = deque()
-        try:
-            while True:
-                for photo in islice(source, 2 * self._num_threads - len(ahead)):
-                    ahead.append(self._photos.submit(self.describe, photo))
-                if not ahead:
-                    return
-                yield ahead.popleft().result()
-        finally:
-            cv2.setNumThreads(threads_before)
-            for future in ahead:
-                future.cancel()
+        stream = map_ahead(self.describe, photos, num_threads=self._num_threads)
+        self._streams.add(stream)
+        return stream
 
     def _describe_pixels(self, photo: Photo, clock: Stopwatch) -> Float32Array:
         if not self._global.needs_pixels:
@@ -100,5 +85,7 @@ class PhotoDescriber(Closing):
             return self._global.describe_pixels(photo.pixels)
 
     def close(self) -> None:
-        self._photos.shutdown(cancel_futures=True)
+        # One that is still held would leave OpenCV and matrix products on one thread.
+        for stream in tuple(self._streams):
+            stream.close()
         self._networks.shutdown(cancel_futures=True)

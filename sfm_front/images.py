@@ -36,14 +36,9 @@ class PhotoReader:
 
     def read(self, path: Path, name: str) -> Photo | Skipped:
         """Read the photo at ``path``, to be known as ``name``. No file makes this raise."""
-        try:
-            # Opening a pipe would wait for ever, so anything that is no file is refused first.
-            if not stat.S_ISREG(path.stat().st_mode):
-                return Skipped(name, SkipReason.UNREADABLE, "not a regular file")
-            data = path.read_bytes()
-        except (OSError, ValueError, MemoryError) as error:
-            detail = getattr(error, "strerror", None) or str(error) or type(error).__name__
-            return Skipped(name, SkipReason.UNREADABLE, detail)
+        data = _content(path, name)
+        if isinstance(data, Skipped):
+            return data
         decoded = decode(data, self.max_image_size)
         if isinstance(decoded, Undecodable):
             return Skipped(name, decoded.reason, decoded.detail)
@@ -60,9 +55,15 @@ class PhotoReader:
             pixels=decoded.pixels,
             width=decoded.width,
             height=decoded.height,
-            digest=hashlib.blake2b(data, digest_size=16).hexdigest(),
+            digest=_digest(data),
             exif=decoded.exif,
         )
+
+
+def file_digest(path: Path, name: str) -> str | Skipped:
+    """The digest that a ``Photo`` of this file has, decodable or not. No file makes this raise."""
+    data = _content(path, name)
+    return data if isinstance(data, Skipped) else _digest(data)
 
 
 class DuplicateFinder:
@@ -81,3 +82,18 @@ class DuplicateFinder:
         if first == name:
             return None
         return Skipped(name, SkipReason.DUPLICATE, f"same file as {first}")
+
+
+def _content(path: Path, name: str) -> bytes | Skipped:
+    try:
+        # Opening a pipe would wait for ever, so anything that is no file is refused first.
+        if not stat.S_ISREG(path.stat().st_mode):
+            return Skipped(name, SkipReason.UNREADABLE, "not a regular file")
+        return path.read_bytes()
+    except (OSError, ValueError, MemoryError) as error:
+        detail = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        return Skipped(name, SkipReason.UNREADABLE, detail)
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.blake2b(data, digest_size=16).hexdigest()

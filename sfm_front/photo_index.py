@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sfm_front.atomic import write_atomically
 from sfm_front.cached_describer import CachedDescriber, Recalled
 from sfm_front.cameras import CameraCatalog, CameraOptions
 from sfm_front.description_files import ContentKeys
 from sfm_front.errors import InputError
+from sfm_front.json_files import write_json
 from sfm_front.progress import CountLine
 from sfm_front.source import PhotoPath
 from sfm_front.types import DescribedPhoto, Float32Array, Skipped, SkipReason
@@ -173,8 +173,7 @@ class PhotoIndex(Mapping[int, View]):
             "settings": self._settings(),
             "photos": {name: asdict(entry) for name, entry in entries.items()},
         }
-        data = json.dumps(content, ensure_ascii=False, indent=1).encode()
-        write_atomically(self._file, lambda file: file.write(data))
+        write_json(self._file, content)
 
     def _settings(self) -> Any:
         # As JSON gives them back: lists for tuples.

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from sfm_front import arguments as shared
 from sfm_front.errors import ConfigError
 from sfm_front.progress import ProgressLine, closing_summary
 from sfm_front.source import list_photos, order_photos
@@ -42,12 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--order", default="name", help="name, time of capture, or random (default: name)"
     )
     photos.add_argument("--seed", type=int, default=0, help="of --order random and of all RANSAC")
-    photos.add_argument(
-        "--max-image-size", type=int, metavar="PX", help="long side to reduce to (default: 1600)"
-    )
-    photos.add_argument(
-        "--max-features", type=int, metavar="N", help="SIFT keypoints a photo (default: 4000)"
-    )
+    shared.add_photos(photos)
     cameras = parser.add_argument_group("cameras")
     cameras.add_argument(
         "--camera-mode",
@@ -58,23 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera-params", metavar="F,CX,CY,…", help="known calibration, in COLMAP's order"
     )
     retrieval = parser.add_argument_group("retrieval")
-    retrieval.add_argument(
-        "--global-descriptor",
-        metavar="NAME",
-        help="vlad, resnet101_pool5, alexnet_fc7, mobilenet_v2, two joined by +, or auto (default)",
-    )
-    retrieval.add_argument("--weights", type=Path, metavar="FILE", help="of the network")
-    retrieval.add_argument(
-        "--candidates", type=int, metavar="N", help="photos re-ranked (default: 25)"
-    )
+    shared.add_retrieval(retrieval)
     retrieval.add_argument(
         "--matched", type=int, metavar="N", help="best of them matched in full (default: 8)"
     )
-    parser.add_argument(
-        "--device",
-        help="of networks and matching: auto (default: a GPU where PyTorch can use one), cpu, cuda",
-    )
-    parser.add_argument("--threads", type=int, metavar="N", help="cores to use (default: all)")
+    shared.add_machine(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -121,23 +105,10 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     from sfm_front.config import SessionOptions, available_cores
     from sfm_front.mapping.atlas import AtlasOptions
     from sfm_front.mapping.mapper import MapperOptions
-    from sfm_front.retrieval.retriever import RetrievalOptions
     from sfm_front.verification import VerificationOptions
 
-    threads = available_cores() if arguments.threads is None else arguments.threads
-    given = {
-        name: value
-        for name in (
-            "max_image_size",
-            "max_features",
-            "global_descriptor",
-            "weights",
-            "matched",
-            "device",
-        )
-        if (value := getattr(arguments, name)) is not None
-    }
-    retrieval = {} if arguments.candidates is None else {"candidates": arguments.candidates}
+    given = shared.given(arguments, "matched")
+    threads = given.setdefault("threads", available_cores())
     cameras = {
         "mode": arguments.camera_mode,
         "model": arguments.camera_model,
@@ -146,9 +117,7 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     return SessionOptions(
         **given,
         text=arguments.text,
-        threads=threads,
         cameras=CameraOptions(**{k: v for k, v in cameras.items() if v is not None}),
-        retrieval=RetrievalOptions(**retrieval),
         verification=VerificationOptions(seed=arguments.seed),
         atlas=AtlasOptions(mapper=MapperOptions(num_threads=threads, seed=arguments.seed)),
     )

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sfm_front.closing import Closing
+from sfm_front.json_files import write_json
 from sfm_front.types import STAGES_AHEAD, ModelSummary, StepReport
 
 
@@ -82,9 +83,7 @@ class Report(Closing):
             "end": {"seconds": _rounded(seconds), "events": list(events)},
             "totals": self._totals(models, model_of, seconds),
         }
-        partial = self._output / "report.json.new"
-        partial.write_text(json.dumps(content, ensure_ascii=False, indent=1), encoding="utf-8")
-        partial.replace(self._output / "report.json")
+        write_json(self._output / "report.json", content)
         return content
 
     def close(self) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sfm_front.atomic import write_atomically
+from sfm_front import arguments as shared
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.progress import CountLine
 from sfm_front.reconstruct import default_output
@@ -81,26 +81,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="ours",
         help="ours (default), exhaustive (match all photos in full) or cosine (no matching)",
     )
-    method.add_argument(
-        "--global-descriptor",
-        metavar="NAME",
-        help="vlad, resnet101_pool5, alexnet_fc7, mobilenet_v2, two joined by +, or auto (default)",
-    )
-    method.add_argument("--weights", type=Path, metavar="FILE", help="of the network")
-    method.add_argument(
-        "--candidates", type=int, metavar="N", help="photos re-ranked (default: 25)"
-    )
-    method.add_argument(
-        "--max-image-size", type=int, metavar="PX", help="long side to reduce to (default: 1600)"
-    )
-    method.add_argument(
-        "--max-features", type=int, metavar="N", help="SIFT keypoints a photo (default: 4000)"
-    )
-    parser.add_argument(
-        "--device",
-        help="of networks and matching: auto (default: a GPU where PyTorch can use one), cpu, cuda",
-    )
-    parser.add_argument("--threads", type=int, metavar="N", help="cores to use (default: all)")
+    shared.add_retrieval(method)
+    shared.add_photos(method)
+    shared.add_machine(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -157,16 +140,8 @@ def _options(arguments: argparse.Namespace) -> tuple[SessionOptions, SearchOptio
     """What was given on the command line; the rest is as in a reconstruction."""
     from sfm_front.config import SessionOptions
     from sfm_front.folder_search import SearchOptions
-    from sfm_front.retrieval.retriever import RetrievalOptions
 
-    names = (
-        *("max_image_size", "max_features", "global_descriptor"),
-        *("weights", "device", "threads"),
-    )
-    given = {name: value for name in names if (value := getattr(arguments, name)) is not None}
-    if arguments.candidates is not None:
-        given["retrieval"] = RetrievalOptions(candidates=arguments.candidates)
-    session = SessionOptions(**given)
+    session = SessionOptions(**shared.given(arguments))
     search = SearchOptions(
         method=arguments.method, retrieval=session.retrieval, rerank=session.rerank
     )
@@ -223,7 +198,7 @@ def _show(
         truth = read_relevance(arguments.truth, [photo.name for photo in photos])
         relevant = [truth.of(answer.query.name) for answer in answers]
     if arguments.json is not None:
-        _write_json(retrieve_output.as_json(answers), arguments.json)
+        _write_rows(retrieve_output.rows(answers), arguments.json)
     if arguments.json != _STANDARD_OUTPUT:
         for answer, names in zip(answers, relevant, strict=True):
             print(retrieve_output.table(answer, names, arguments.top))
@@ -232,11 +207,13 @@ def _show(
         _note(f"wrote {arguments.sheet}")
 
 
-def _write_json(text: str, file: Path) -> None:
+def _write_rows(rows: Sequence[object], file: Path) -> None:
+    from sfm_front.json_files import as_json, write_json
+
     if file == _STANDARD_OUTPUT:
-        print(text)
+        print(as_json(rows))
         return
-    write_atomically(file, lambda stream: stream.write(f"{text}\n".encode()))
+    write_json(file, rows)
     _note(f"wrote {file}")
 
 

@@ -1,10 +1,9 @@
-"""The answers of a photo search as a table, as JSON, and as pictures."""
+"""The answers of a photo search as a table, as rows for JSON, and as pictures."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sfm_front.folder_search import Answer, Found, VerifiedMatches
 from sfm_front.types import DescribedPhoto
@@ -32,9 +31,9 @@ def table(answer: Answer, relevant: Collection[str] | None, count: int) -> str:
     return "\n".join(lines)
 
 
-def as_json(answers: Sequence[Answer]) -> str:
-    """A list of objects, query after query and best first; ``seconds`` are those of the query."""
-    rows = [
+def rows(answers: Sequence[Answer]) -> list[dict[str, Any]]:
+    """A row a photo, query after query and best first; ``seconds`` are those of the query."""
+    return [
         {
             "query": answer.query.name,
             "rank": rank,
@@ -47,14 +46,13 @@ def as_json(answers: Sequence[Answer]) -> str:
         for answer in answers
         for rank, found in enumerate(answer.found, 1)
     ]
-    return json.dumps(rows, ensure_ascii=False, indent=1)
 
 
 def sheet(answers: Sequence[Answer], relevant: Sequence[Collection[str] | None]) -> Image:
     """The contact sheet of all answers."""
     from sfm_front.viewers.contact_sheet import SHOWN, SheetRow, Tile, contact_sheet
 
-    rows = []
+    sheet_rows = []
     for answer, names in zip(answers, relevant, strict=True):
         tiles = [
             Tile(
@@ -66,8 +64,8 @@ def sheet(answers: Sequence[Answer], relevant: Sequence[Collection[str] | None])
             for rank, found in enumerate(answer.found[:SHOWN], 1)
         ]
         query = Tile(answer.query.path, answer.query.name, "query")
-        rows.append(SheetRow(query, tiles))
-    return contact_sheet(rows)
+        sheet_rows.append(SheetRow(query, tiles))
+    return contact_sheet(sheet_rows)
 
 
 def matches_picture(

@@ -9,6 +9,7 @@ import numpy as np
 import pycolmap
 
 from sfm_front.closing import Closing
+from sfm_front.rigs import trivial_frame, trivial_rig
 from sfm_front.types import DescribedPhoto, GeoPosition, PairGeometry
 
 
@@ -34,14 +35,10 @@ class Store(Closing):
         with pycolmap.DatabaseTransaction(database):
             if not database.exists_camera(camera.camera_id):
                 database.write_camera(camera, use_camera_id=True)
-                rig = pycolmap.Rig(rig_id=camera.camera_id)
-                rig.add_ref_sensor(camera.sensor_id)
-                database.write_rig(rig, use_rig_id=True)
+                database.write_rig(trivial_rig(camera), use_rig_id=True)
             image = pycolmap.Image(name=photo.name, camera_id=camera.camera_id, image_id=image_id)
-            frame = pycolmap.Frame(frame_id=image_id, rig_id=camera.camera_id)
-            frame.add_data_id(image.data_id)
             database.write_image(image, use_image_id=True)
-            database.write_frame(frame, use_frame_id=True)
+            database.write_frame(trivial_frame(image), use_frame_id=True)
             database.write_keypoints(image_id, photo.features.keypoints)
             database.write_descriptors(
                 image_id,

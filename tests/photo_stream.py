@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pycolmap
 
-from sfm_front.evaluation.synthetic import SyntheticScene
+from sfm_front.evaluation.synthetic import SyntheticScene, as_described
 from sfm_front.features.vlad import Vlad
 from sfm_front.mapping.scene import Scene
-from sfm_front.types import DescribedPhoto, Exif, Features, Float64Array, PairGeometry
+from sfm_front.types import DescribedPhoto, Features, Float64Array, PairGeometry
 from sfm_front.verification import View
 
 MIN_SHARED_POINTS = 30
@@ -22,17 +22,8 @@ _VLAD = Vlad()
 def described(scene: SyntheticScene, index: int, *, prefix: str = "") -> DescribedPhoto:
     """Photo ``index`` as if it had been read and described."""
     photo = scene.photo(index)
-    name = prefix + photo.name
-    return DescribedPhoto(
-        name=name,
-        path=Path(name),
-        width=scene.camera.width,
-        height=scene.camera.height,
-        digest=name,
-        exif=Exif(),
-        features=photo.features,
-        global_vector=_VLAD.describe(photo.features),
-    )
+    named = replace(photo, name=prefix + photo.name)
+    return as_described(named, scene.camera, _VLAD.describe(photo.features))
 
 
 def view_of(scene: SyntheticScene, index: int, image_id: int) -> View:

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from sfm_front import description_files
-from sfm_front.cached_describer import CachedDescriber, Recalled, crop, file_digest
+from sfm_front.cached_describer import CachedDescriber, Recalled, crop
 from sfm_front.description_files import DescriptionFiles, LocalDescription
 from sfm_front.features.global_descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
@@ -190,10 +190,6 @@ def test_photos_come_in_order_and_bad_ones_with_their_reason(tmp_path, photo):
     assert results[0].reason is SkipReason.NO_FEATURES
     assert results[2].reason is SkipReason.NOT_AN_IMAGE
     assert results[3].reason is SkipReason.UNREADABLE
-
-
-def test_something_that_is_no_file_is_unreadable(tmp_path):
-    assert isinstance(file_digest(PhotoPath("folder", tmp_path)), Skipped)
 
 
 def test_what_a_camera_wrote_comes_back(tmp_path, photo):

@@ -26,7 +26,12 @@ def run_in_process_of_its_own(*arguments: str) -> subprocess.CompletedProcess[st
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--help"], ["reconstruct", "--help"], ["view", "--help"], ["--version"]]
+    "arguments",
+    [
+        ["--help"],
+        *([name, "--help"] for name in ("reconstruct", "retrieve", "view")),
+        ["--version"],
+    ],
 )
 def test_help_loads_nothing_heavy(arguments):
     code = (

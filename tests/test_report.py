@@ -101,7 +101,7 @@ def test_retrieval_is_on_disk_before_the_next_photo(tmp_path):
 def test_the_file_is_what_finish_returns(report, tmp_path):
     content = finish(report, tmp_path)
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == content
-    assert not (tmp_path / "report.json.new").exists()
+    assert {path.name for path in tmp_path.iterdir()} == {"report.json", "retrieval.jsonl"}
 
 
 def test_a_row_a_photo_in_their_order(report, tmp_path):

@@ -13,10 +13,10 @@ from sfm_front.config import SessionOptions
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import auc, pose_errors
 from sfm_front.evaluation.process import resident_bytes
-from sfm_front.evaluation.synthetic import SyntheticScene, make_scene
+from sfm_front.evaluation.synthetic import as_described, make_scene
 from sfm_front.features.global_descriptor import resolve
 from sfm_front.session import Session
-from sfm_front.types import DescribedPhoto, Exif, StepReport
+from sfm_front.types import StepReport
 
 _DESCRIPTOR = "vlad"
 
@@ -104,8 +104,9 @@ def run_stream(
     costs: list[PhotoCost] = []
     with Session(output, options) as session:
         for index in range(num_photos):
-            features = scene.photo(index).features
-            photo = _described(scene, index, descriptor.describe(np.empty(0, np.uint8), features))
+            seen = scene.photo(index)
+            vector = descriptor.describe(np.empty(0, np.uint8), seen.features)
+            photo = as_described(seen, scene.camera, vector)
             started, processor_started = perf_counter(), process_time()
             step = session.take(photo)
             seconds = perf_counter() - started
@@ -127,19 +128,4 @@ def run_stream(
         finish_seconds=finish_seconds,
         num_registered=max((int(model.num_reg_images()) for model in models), default=0),
         auc=tuple(auc(pose_errors(scene.truth(), models))),
-    )
-
-
-def _described(scene: SyntheticScene, index: int, vector: np.ndarray) -> DescribedPhoto:
-    """Photo ``index`` as if it had been read and described."""
-    photo = scene.photo(index)
-    return DescribedPhoto(
-        name=photo.name,
-        path=Path(photo.name),
-        width=scene.camera.width,
-        height=scene.camera.height,
-        digest=photo.name,
-        exif=Exif(),
-        features=photo.features,
-        global_vector=vector,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic_world import World, fly_orbit, fly_strip
-from sfm_front.types import Features, Float64Array, Uint8Array
+from sfm_front.types import DescribedPhoto, Exif, Features, Float32Array, Float64Array, Uint8Array
 
 Layout = Literal["orbit", "strip"]
 
@@ -167,6 +168,25 @@ def make_scene(
         _world=world,
         _descriptors=_random_descriptors(len(world.points), rng),
         _colors=rng.integers(0, 256, (len(world.points), 3), dtype=np.uint8),
+    )
+
+
+def as_described(
+    photo: SyntheticPhoto, camera: pycolmap.Camera, global_vector: Float32Array
+) -> DescribedPhoto:
+    """The photo as if ``camera`` had taken it and it had been read from a file and described.
+
+    ``global_vector`` (D,) float32.
+    """
+    return DescribedPhoto(
+        name=photo.name,
+        path=Path(photo.name),
+        width=camera.width,
+        height=camera.height,
+        digest=photo.name,
+        exif=Exif(),
+        features=photo.features,
+        global_vector=global_vector,
     )
 
 

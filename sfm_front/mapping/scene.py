@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable
 
 import pycolmap
 
+from sfm_front.rigs import trivial_frame, trivial_rig
 from sfm_front.types import Float32Array, PairGeometry
 
 
@@ -35,7 +36,7 @@ class Scene:
         cache = self._cache
         if not cache.exists_camera(camera.camera_id):
             cache.add_camera(camera)
-            cache.add_rig(_trivial_rig(camera))
+            cache.add_rig(trivial_rig(camera))
         image = pycolmap.Image(
             name=name,
             keypoints=keypoints[:, :2].astype("float64"),
@@ -43,7 +44,7 @@ class Scene:
             image_id=image_id,
         )
         image.frame_id = image_id
-        cache.add_frame(_trivial_frame(image, camera.camera_id))
+        cache.add_frame(trivial_frame(image))
         cache.add_image(image)
         self._neighbors[image_id] = {}
         for pair in pairs:
@@ -125,15 +126,3 @@ class Scene:
         reconstruction.add_frame(cache.frame(image.frame_id))
         reconstruction.add_image(image)
         mapper.observation_manager.add_image(image_id)
-
-
-def _trivial_rig(camera: pycolmap.Camera) -> pycolmap.Rig:
-    rig = pycolmap.Rig(rig_id=camera.camera_id)
-    rig.add_ref_sensor(camera.sensor_id)
-    return rig
-
-
-def _trivial_frame(image: pycolmap.Image, rig_id: int) -> pycolmap.Frame:
-    frame = pycolmap.Frame(frame_id=image.image_id, rig_id=rig_id)
-    frame.add_data_id(image.data_id)
-    return frame

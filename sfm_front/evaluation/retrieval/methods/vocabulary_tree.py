@@ -16,6 +16,7 @@ import pycolmap
 
 from sfm_front.evaluation.retrieval.methods.training import num_words_for, sample_descriptors
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
+from sfm_front.rigs import trivial_frame, trivial_rig
 from sfm_front.stopwatch import Stopwatch
 from sfm_front.types import Features, Float32Array
 
@@ -112,15 +113,11 @@ def _database_of(features: Features, image_id: int) -> pycolmap.Database:
     """A database in memory with one photo, as little of it as COLMAP needs for a query."""
     database = pycolmap.Database.open(":memory:")
     camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_PINHOLE", 1.0, 1, 1)
-    rig = pycolmap.Rig(rig_id=1)
-    rig.add_ref_sensor(camera.sensor_id)
     image = pycolmap.Image(name="query", camera_id=1, image_id=image_id)
-    frame = pycolmap.Frame(frame_id=image_id, rig_id=1)
-    frame.add_data_id(image.data_id)
     database.write_camera(camera, use_camera_id=True)
-    database.write_rig(rig, use_rig_id=True)
+    database.write_rig(trivial_rig(camera), use_rig_id=True)
     database.write_image(image, use_image_id=True)
-    database.write_frame(frame, use_frame_id=True)
+    database.write_frame(trivial_frame(image), use_frame_id=True)
     database.write_keypoints(image_id, features.keypoints)
     database.write_descriptors(
         image_id,

@@ -1,0 +1,51 @@
+"""Command-line arguments that several commands have."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_photos(group: argparse._ActionsContainer) -> None:
+    """Declare how photos are read."""
+    group.add_argument(
+        "--max-image-size", type=int, metavar="PX", help="long side to reduce to (default: 1600)"
+    )
+    group.add_argument(
+        "--max-features", type=int, metavar="N", help="SIFT keypoints a photo (default: 4000)"
+    )
+
+
+def add_retrieval(group: argparse._ActionsContainer) -> None:
+    """Declare how photos are retrieved."""
+    group.add_argument(
+        "--global-descriptor",
+        metavar="NAME",
+        help="vlad, resnet101_pool5, alexnet_fc7, mobilenet_v2, two joined by +, or auto (default)",
+    )
+    group.add_argument("--weights", type=Path, metavar="FILE", help="of the network")
+    group.add_argument("--candidates", type=int, metavar="N", help="photos re-ranked (default: 25)")
+
+
+def add_machine(group: argparse._ActionsContainer) -> None:
+    """Declare what of the machine is used."""
+    group.add_argument(
+        "--device",
+        help="of networks and matching: auto (default: a GPU where PyTorch can use one), cpu, cuda",
+    )
+    group.add_argument("--threads", type=int, metavar="N", help="cores to use (default: all)")
+
+
+def given(arguments: argparse.Namespace, *more: str) -> dict[str, Any]:
+    """Fields of ``SessionOptions`` for those of these arguments, and ``more``, that were given."""
+    from sfm_front.retrieval.retriever import RetrievalOptions
+
+    names = (
+        *("max_image_size", "max_features", "global_descriptor", "weights", "device", "threads"),
+        *more,
+    )
+    fields = {name: value for name in names if (value := getattr(arguments, name)) is not None}
+    if arguments.candidates is not None:
+        fields["retrieval"] = RetrievalOptions(candidates=arguments.candidates)
+    return fields
