@@ -11,9 +11,8 @@ from sfm_front.errors import ConfigError
 from sfm_front.matcher import make_matcher
 from sfm_front.matching import NO_MATCHES, MatchingOptions, match
 from sfm_front.photo_index import PhotoIndex, view_of
-from sfm_front.retrieval.index import CosineIndex
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
-from sfm_front.retrieval.retriever import RetrievalOptions
+from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.source import PhotoPath
 from sfm_front.stopwatch import Stopwatch
 from sfm_front.types import Candidate, DescribedPhoto, Float64Array, PairGeometry
@@ -31,8 +30,8 @@ class SearchOptions:
 
     ``method``:
       ``ours``: those of highest cosine by verified matches of their largest features, then the
-      others by cosine.
-      ``exhaustive``: all by verified matches of all features.
+      others by what they and the query look like.
+      ``exhaustive``: all by verified matches of all features, likewise.
       ``cosine``: all by cosine.
     """
 
@@ -61,8 +60,8 @@ class Found:
 class Answer:
     """Photos of the folder, best first.
 
-    ``seconds`` of the ``coarse`` step, of reading the features of the photos it proposed, and of
-    the ``fine`` step.
+    ``seconds`` of the ``coarse`` step, to ``read`` the features of the photos it proposed, of the
+    ``fine`` step, and to ``rank`` all others.
     """
 
     query: PhotoPath
@@ -93,11 +92,13 @@ class FolderSearch:
         self._matching = MatchingOptions()
         self._verifier = Verifier()
         matcher = make_matcher(device, self._matching, workers)
-        self._reranker = Reranker(self._rerank_options(), matcher, self._verifier, workers)
+        reranker = Reranker(self._rerank_options(), matcher, self._verifier, workers)
         vectors = workers.map(index.vector, index.photos)
-        self._cosines = CosineIndex(len(vectors[0]) if vectors else 0)
+        dimension = len(vectors[0]) if vectors else 0
+        self._num_candidates = self._how_many_to_match(len(vectors))
+        self._retriever = Retriever(self._retrieval_options(), dimension, reranker)
         for image_id, vector in zip(index.photos, vectors, strict=True):
-            self._cosines.add(image_id, vector)
+            self._retriever.remember(image_id, vector)
         self._ids = {photo.path.resolve(): image_id for image_id, photo in index.photos.items()}
 
     def ask(self, query: DescribedPhoto) -> Answer:
@@ -105,32 +106,27 @@ class FolderSearch:
         clock = Stopwatch()
         query_id = self._ids.get(query.path.resolve(), _NOT_INDEXED)
         with clock.stage("coarse"):
-            ranked = self._coarse(query, query_id)
-        count = self._num_reranked()
+            proposed = self._proposed(query, query_id)
         with clock.stage("read"):
-            proposed = [candidate.image_id for candidate in ranked[:count]]
-            read = self._workers.map(self._index.__getitem__, proposed)
+            ids = [candidate.image_id for candidate in proposed]
+            views = dict(zip(ids, self._workers.map(self._index.__getitem__, ids), strict=True))
         with clock.stage("fine"):
-            views = dict(zip(proposed, read, strict=True))
-            ranked[:count] = self._reranker.rerank(view_of(query_id, query), ranked[:count], views)
+            reranked = self._retriever.rerank(view_of(query_id, query), proposed, views)
+        with clock.stage("rank"):
+            ranked = self._retriever.rank(query.global_vector, reranked)
         found = tuple(
-            Found(self._index.photos[c.image_id], c.image_id, c.cosine, c.inliers) for c in ranked
+            Found(self._index.photos[c.image_id], c.image_id, c.cosine, c.inliers)
+            for c in ranked
+            if c.image_id != query_id
         )
         return Answer(PhotoPath(query.name, query.path), found, clock.seconds)
 
-    def _coarse(self, query: DescribedPhoto, query_id: int) -> list[Candidate]:
-        """All photos but the query's own: those to be re-ranked, then the others by cosine."""
-        options = self._options.retrieval
-        proposed: list[Candidate] = []
-        if self._options.method == "ours":
-            # One more: the query may be among them.
-            proposed = self._cosines.query(
-                query.global_vector, options.candidates + 1, widen_by=options.widen_by
-            )
-            proposed = [c for c in proposed if c.image_id != query_id][: options.candidates]
-        left_out = {query_id, *(candidate.image_id for candidate in proposed)}
-        everything = self._cosines.query(query.global_vector, len(self._cosines))
-        return proposed + [c for c in everything if c.image_id not in left_out]
+    def _proposed(self, query: DescribedPhoto, query_id: int) -> list[Candidate]:
+        """The photos to be re-ranked: never the query's own."""
+        if self._options.method == "cosine":
+            return []
+        found = self._retriever.candidates(query.global_vector)
+        return [c for c in found if c.image_id != query_id][: self._num_candidates]
 
     def verified_matches(self, query: DescribedPhoto, other: DescribedPhoto) -> VerifiedMatches:
         """Match two photos on all features, and verify; no match is left if they are rejected."""
@@ -144,14 +140,19 @@ class FolderSearch:
             view1.points(inliers[:, 0]), view2.points(inliers[:, 1]), len(matches)
         )
 
+    def _how_many_to_match(self, num_photos: int) -> int:
+        return {
+            "ours": self._options.retrieval.candidates,
+            "exhaustive": num_photos,
+            "cosine": 0,
+        }[self._options.method]
+
+    def _retrieval_options(self) -> RetrievalOptions:
+        # One more: the query may be among them.
+        options = replace(self._options.retrieval, candidates=self._num_candidates + 1)
+        return replace(options, widen_by=0) if self._options.method == "cosine" else options
+
     def _rerank_options(self) -> RerankOptions:
         if self._options.method == "exhaustive":
             return replace(self._options.rerank, max_features=sys.maxsize)
         return self._options.rerank
-
-    def _num_reranked(self) -> int:
-        return {
-            "ours": self._options.retrieval.candidates,
-            "exhaustive": len(self._cosines),
-            "cosine": 0,
-        }[self._options.method]

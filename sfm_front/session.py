@@ -106,6 +106,7 @@ class Session(Closing):
         self._store = Store(database)
         self._scene = Scene()
         self._atlas = Atlas(self._scene, self.options.atlas)
+        self._views: dict[int, View] = {}
         self._names: dict[int, str] = {}
         self._report = Report(output)
 
@@ -134,11 +135,10 @@ class Session(Closing):
         clock = Stopwatch()
         with clock.stage("finish"):
             self._atlas.finish()
-        views = self._retriever.views
         with clock.stage("export"):
             models = export_models(
                 [model.reconstruction for model in self._atlas.models],
-                {image_id: view.features.colors for image_id, view in views.items()},
+                {image_id: view.features.colors for image_id, view in self._views.items()},
                 self.output / "sparse",
                 text=self.options.text,
             )
@@ -159,13 +159,13 @@ class Session(Closing):
     def _place(self, photo: DescribedPhoto) -> StepReport:
         """The method: retrieve, verify, store, map, remember."""
         clock = Stopwatch()
-        image_id = len(self._retriever.views) + 1
+        image_id = len(self._views) + 1
         camera = self._cameras.camera_for(photo).camera
         view = View(image_id, camera, photo.features)
         with clock.stage("retrieve"):
             candidates = self._retriever.candidates(photo.global_vector)
         with clock.stage("rerank"):
-            candidates = self._retriever.rerank(view, candidates)
+            candidates = self._retriever.rerank(view, candidates, self._views)
         pairs = self._verify(view, candidates[: self.options.matched], clock)
         with clock.stage("store"):
             self._store.write(image_id, photo, camera, pairs)
@@ -174,7 +174,8 @@ class Session(Closing):
             registered = self._atlas.add(image_id)
         # Apart from the rest of mapping: it alone depends on how many photos came before.
         clock.move("map", "refine", self._atlas.take_refinement_seconds())
-        self._retriever.remember(view, photo.global_vector)
+        self._retriever.remember(image_id, photo.global_vector)
+        self._views[image_id] = view
         self._names[image_id] = photo.name
         return StepReport(
             name=photo.name,
@@ -199,7 +200,7 @@ class Session(Closing):
             return self._verifier.verify(view, *tentative)
 
         with clock.stage("match"):
-            matches = self._pairing.match(view, candidates, self._retriever.views)
+            matches = self._pairing.match(view, candidates, self._views)
         with clock.stage("verify"):
             verified = self._workers.map(verify_with, matches)
         return [pair for pair in verified if isinstance(pair, PairGeometry)]

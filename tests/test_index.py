@@ -135,3 +135,15 @@ def test_a_widened_query_is_the_sum_with_its_best():
         [candidate.cosine for candidate in found], exact[order], atol=COSINE_TOLERANCE
     )
     assert order != np.argsort(-exact).tolist()
+
+
+def test_a_query_widened_with_photos_is_the_sum_with_those():
+    vectors = spread_around(random_vectors(7)[3], 40)
+    query, chosen = vectors[20], [3, 31]
+    exact = vectors @ query
+    wide = query + exact[chosen] @ vectors[chosen]
+    found = index_of(vectors).query(query, 40, widen_with=chosen)
+    order = [candidate.image_id for candidate in found]
+    expected = vectors @ unit_length(wide)
+    np.testing.assert_allclose(expected[order], np.sort(expected)[::-1], atol=COSINE_TOLERANCE)
+    assert order != np.argsort(-exact).tolist()

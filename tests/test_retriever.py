@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from photo_stream import described, true_matches
 
@@ -12,8 +13,11 @@ from sfm_front.matcher import CpuMatcher
 from sfm_front.matching import MatchingOptions
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
+from sfm_front.types import Candidate
 from sfm_front.verification import Verifier, View
 from sfm_front.workers import Workers
+
+COSINE_TOLERANCE = 0.01
 
 
 @pytest.fixture
@@ -28,14 +32,17 @@ def retriever():
 
 def test_the_most_relevant_photo_is_the_one_that_overlaps_most(retriever):
     scene = make_scene(16, 300, seed=8, layout="orbit")
+    views = {}
     for index in range(15):
         photo = described(scene, index)
-        retriever.remember(View(index, scene.camera, photo.features), photo.global_vector)
+        views[index] = View(index, scene.camera, photo.features)
+        retriever.remember(index, photo.global_vector)
+    assert len(retriever) == 15
     query = described(scene, 15)
     coarse = retriever.candidates(query.global_vector)
     assert len(coarse) == 6
     assert all(-1 <= candidate.cosine <= 1 for candidate in coarse)
-    fine = retriever.rerank(View(15, scene.camera, query.features), coarse)
+    fine = retriever.rerank(View(15, scene.camera, query.features), coarse, views)
     assert sorted(c.image_id for c in fine) == sorted(c.image_id for c in coarse)
     best = max(range(15), key=lambda index: len(true_matches(scene, 15, index)))
     assert fine[0].image_id == best
@@ -46,7 +53,38 @@ def test_the_first_photo_has_no_candidates(retriever):
     scene = make_scene(2, 50, seed=9)
     photo = described(scene, 0)
     assert retriever.candidates(photo.global_vector) == []
-    assert retriever.rerank(View(1, scene.camera, photo.features), []) == []
+    assert retriever.rerank(View(1, scene.camera, photo.features), [], {}) == []
+    assert retriever.rank(photo.global_vector, []) == []
+
+
+def unit(*numbers: float) -> np.ndarray:
+    vector = np.zeros(Vlad().dimension, np.float32)
+    vector[: len(numbers)] = numbers
+    return vector / np.linalg.norm(vector)
+
+
+def test_of_the_others_those_like_the_verified_photos_come_first(retriever):
+    """Photo 1 was verified, 2 is like it, 3 is a little more like the query alone."""
+    query = unit(1, 0, 0, 0)
+    for image_id, vector in enumerate(
+        [unit(1, 2, 0, 0), unit(1, 3, 0, 0), unit(1, 0, 2.5, 0), unit(0, 0, 0, 1)], 1
+    ):
+        retriever.remember(image_id, vector)
+    looked = [Candidate(1, 0.447, 40), Candidate(3, 0.371, 14)]
+    found = retriever.rank(query, looked)
+    assert [c.image_id for c in found] == [1, 2, 3, 4]
+    assert [c.inliers for c in found] == [40, None, 14, None]
+    assert found[1].cosine == pytest.approx(1 / 10**0.5, abs=COSINE_TOLERANCE)
+
+
+def test_where_none_was_verified_the_best_by_cosine_stand_in(retriever):
+    query = unit(1, 0, 0)
+    for image_id, vector in enumerate([unit(1, 2, 0), unit(1, 3, 0), unit(1, 0, 2.5)], 1):
+        retriever.remember(image_id, vector)
+    (*first,) = retriever.candidates(query)
+    found = retriever.rank(query, [Candidate(1, 0.447, 14)])
+    assert [c.image_id for c in found] == [c.image_id for c in first]
+    assert found[[c.image_id for c in found].index(1)].inliers == 14
 
 
 def test_no_candidates_asked_for_is_refused():

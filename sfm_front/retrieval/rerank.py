@@ -34,6 +34,8 @@ class Reranker:
         self._matcher = matcher
         self._verifier = verifier
         self._workers = workers
+        self.min_inliers = verifier.options.min_inliers
+        """With so many a candidate counts as verified."""
 
     def rerank(
         self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]

@@ -1,11 +1,14 @@
 """Hierarchical retrieval: cosine candidates, re-ranked; the most relevant photo first.
 
 Source: Zhan, Zhou and Yang, "A Method of Hierarchical Image Retrieval for Real-Time Photogrammetry
-Based on Multiple Features", IEEE Access 2020, doi 10.1109/ACCESS.2020.2969287.
+Based on Multiple Features", IEEE Access 2020, doi 10.1109/ACCESS.2020.2969287. Widening a query
+with verified answers: Chum et al., "Total recall: automatic query expansion with a generative
+feature model for object retrieval", ICCV 2007.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
@@ -31,25 +34,44 @@ class RetrievalOptions:
 
 
 class Retriever:
-    """Remembers photos and ranks them for a new one."""
+    """Remembers photos by their global vectors, and ranks them for another one."""
 
     def __init__(self, options: RetrievalOptions, dimension: int, reranker: Reranker) -> None:
         self._options = options
         self._index = CosineIndex(dimension)
         self._reranker = reranker
-        self.views: dict[int, View] = {}
-        """The photos it remembers, by image id."""
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+    def remember(self, image_id: int, vector: Float32Array) -> None:
+        """Let later photos find this one by its (dimension,) vector of length 1."""
+        self._index.add(image_id, vector)
 
     def candidates(self, vector: Float32Array) -> list[Candidate]:
         """The coarse step: photos by a (dimension,) global vector and its best, best first."""
         options = self._options
         return self._index.query(vector, options.candidates, widen_by=options.widen_by)
 
-    def rerank(self, query: View, candidates: list[Candidate]) -> list[Candidate]:
+    def rerank(
+        self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]
+    ) -> list[Candidate]:
         """The fine step: candidates by verified matches; the first is the most relevant photo."""
-        return self._reranker.rerank(query, candidates, self.views)
+        return self._reranker.rerank(query, candidates, views)
 
-    def remember(self, view: View, vector: Float32Array) -> None:
-        """Let later photos find this one."""
-        self._index.add(view.image_id, vector)
-        self.views[view.image_id] = view
+    def rank(self, vector: Float32Array, reranked: Sequence[Candidate]) -> list[Candidate]:
+        """All photos: candidates that were verified, as re-ranked, then the others.
+
+        The others are ordered by the vector widened with the verified ones, which show the same
+        for certain; without any, with its best, as in the coarse step.
+        """
+        verified = [c for c in reranked if (c.inliers or 0) >= self._reranker.min_inliers]
+        first = [candidate.image_id for candidate in verified]
+        others = self._index.query(
+            vector,
+            len(self),
+            widen_by=0 if verified else self._options.widen_by,
+            widen_with=first,
+        )
+        known = {candidate.image_id: candidate for candidate in reranked}
+        return verified + [known.get(c.image_id, c) for c in others if c.image_id not in set(first)]

@@ -17,16 +17,10 @@ class ByVector:
         self.global_vectors = (name,)
 
     def build(self, photos: Sequence[BenchPhoto]) -> None:
-        self._index = index_of(photos, self.name)
+        self._index = CosineIndex(len(photos[0].vectors[self.name]) if photos else 0)
+        for photo in photos:
+            self._index.add(photo.view.image_id, photo.vectors[self.name])
 
     def rank(self, query: BenchPhoto) -> list[Ranked]:
         found = self._index.query(query.vectors[self.name], len(self._index))
         return [Ranked(c.image_id, c.cosine, cosine=c.cosine) for c in found]
-
-
-def index_of(photos: Sequence[BenchPhoto], vector: str) -> CosineIndex:
-    """The photos' vectors of this name in an index, under their image ids."""
-    index = CosineIndex(len(photos[0].vectors[vector]) if photos else 0)
-    for photo in photos:
-        index.add(photo.view.image_id, photo.vectors[vector])
-    return index
