@@ -165,7 +165,9 @@ class Session(Closing):
         with clock.stage("retrieve"):
             candidates = self._retriever.candidates(photo.global_vector)
         with clock.stage("rerank"):
-            candidates = self._retriever.rerank(view, candidates, self._views)
+            candidates = self._retriever.rerank(
+                view, candidates, self._views, enough=self.options.matched
+            )
         pairs = self._verify(view, candidates[: self.options.matched], clock)
         with clock.stage("store"):
             self._store.write(image_id, photo, camera, pairs)

@@ -54,10 +54,18 @@ class Retriever:
         return self._index.query(vector, options.candidates, widen_by=options.widen_by)
 
     def rerank(
-        self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]
+        self,
+        query: View,
+        candidates: Sequence[Candidate],
+        views: Mapping[int, View],
+        *,
+        enough: int | None = None,
     ) -> list[Candidate]:
-        """The fine step: candidates by verified matches; the first is the most relevant photo."""
-        return self._reranker.rerank(query, candidates, views)
+        """The fine step: candidates by verified matches; the first is the most relevant photo.
+
+        ``enough``: see ``Reranker.rerank``.
+        """
+        return self._reranker.rerank(query, candidates, views, enough=enough)
 
     def rank(self, vector: Float32Array, reranked: Sequence[Candidate]) -> list[Candidate]:
         """All photos: candidates that were verified, as re-ranked, then the others.
