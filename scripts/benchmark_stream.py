@@ -71,13 +71,14 @@ def tell(step: StepReport) -> None:
 def format_result(result: StreamResult) -> str:
     count = len(result.photos)
     bounds = [*range(0, count, 100), count]
-    lines = ["photos         seconds  with refinement  processor's  memory MiB"]
+    lines = ["photos         seconds  with refinement  amortized  processor's  memory MiB"]
+    amortized = result.amortized_seconds()
     lines += [
-        _line(start, end, result.photos[start:end])
+        _line(start, end, result.photos[start:end], float(np.mean(amortized[start:end])))
         for start, end in pairwise(bounds)
         if end - start > 1
     ]
-    early, late = slice(100, 200), slice(count - 100, count)
+    early, late = slice(100, 200), slice(min(900, count - 100), min(1000, count))
     areas = ", ".join(
         f"{100 * area:.1f} at {threshold:g}°"
         for threshold, area in zip(AUC_THRESHOLDS_DEG, result.auc, strict=True)
@@ -85,8 +86,9 @@ def format_result(result: StreamResult) -> str:
     per_photo = result.memory_per_photo(100)
     growth = result.growth(early, late)
     lines += [
-        f"growth from photos 100-200 to the last 100: {growth.seconds:.2f}, "
-        f"with global refinement {growth.seconds_with_refinement:.2f}, "
+        f"growth from photos 100-200 to {late.start}-{late.stop}: {growth.seconds:.2f}, "
+        f"with global refinement as it fell {growth.seconds_with_refinement:.2f}, "
+        f"amortized {growth.amortized_seconds:.2f}, "
         f"of the processor's seconds {growth.processor_seconds:.2f}",
         f"they follow the photo's number to the power {result.exponent(100):.2f}",
         "memory a photo: " + ("-" if per_photo is None else f"{per_photo / 2**20:.2f} MiB"),
@@ -96,13 +98,16 @@ def format_result(result: StreamResult) -> str:
     return "\n".join(lines)
 
 
-def _line(start: int, end: int, photos: Sequence[PhotoCost]) -> str:
+def _line(start: int, end: int, photos: Sequence[PhotoCost], amortized: float) -> str:
     seconds = np.mean([photo.seconds for photo in photos])
     refined = np.mean([photo.seconds_with_refinement for photo in photos])
     processor = np.mean([photo.processor_seconds for photo in photos])
     memory = photos[-1].memory_bytes
     shown = "-" if memory is None else f"{memory / 2**20:.0f}"
-    return f"{f'{start}-{end}':<12}{seconds:>10.3f}{refined:>17.3f}{processor:>13.3f}{shown:>12}"
+    return (
+        f"{f'{start}-{end}':<12}{seconds:>10.3f}{refined:>17.3f}{amortized:>11.3f}"
+        f"{processor:>13.3f}{shown:>12}"
+    )
 
 
 def main() -> int:

@@ -59,8 +59,8 @@ def match_turned(
 ) -> Uint32Array:
     """Like ``match``, but only features whose orientations agree with the photos' turn meet.
 
-    On pairs of nine scenes it took 0.24 to 0.55 of the time and gave 1.03 to 1.21 times the
-    inliers: a feature's second nearest is not sought where no match can be.
+    On 12 pairs of each of nine scenes it took 0.22 to 0.46 of the time and gave 1.02 to 1.16 times
+    the inliers: a feature's second nearest is not sought where no match can be.
     """
     plan = sectors(features1.keypoints[:, 3], features2.keypoints[:, 3], turn_rad)
     descriptors1 = features1.descriptors[plan.order1]

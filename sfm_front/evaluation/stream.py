@@ -16,7 +16,7 @@ from sfm_front.evaluation.process import resident_bytes
 from sfm_front.evaluation.synthetic import as_described, make_scene
 from sfm_front.features.global_descriptor import resolve
 from sfm_front.session import Session
-from sfm_front.types import StepReport
+from sfm_front.types import Float64Array, StepReport
 
 _DESCRIPTOR = "vlad"
 
@@ -37,10 +37,12 @@ class PhotoCost:
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """How many times more late photos cost than early ones, by the figures of ``PhotoCost``."""
+    """How many times more late photos cost than early ones, by the figures of ``PhotoCost`` and,
+    as ``amortized_seconds``, with each refinement spread over the photos since the one before."""
 
     seconds: float
     seconds_with_refinement: float
+    amortized_seconds: float
     processor_seconds: float
 
 
@@ -56,12 +58,33 @@ class StreamResult:
 
     def growth(self, early: slice, late: slice) -> Growth:
         """Means of the late photos over means of the early ones, each figure by itself."""
-        figures = ("seconds", "seconds_with_refinement", "processor_seconds")
-        means = {
-            name: [np.mean([getattr(p, name) for p in self.photos[part]]) for part in (early, late)]
-            for name in figures
+        figures = {
+            name: np.array([getattr(photo, name) for photo in self.photos])
+            for name in ("seconds", "seconds_with_refinement", "processor_seconds")
         }
-        return Growth(**{name: float(late / early) for name, (early, late) in means.items()})
+        figures["amortized_seconds"] = self.amortized_seconds()
+        return Growth(
+            **{
+                name: float(np.nanmean(values[late]) / np.nanmean(values[early]))
+                for name, values in figures.items()
+            }
+        )
+
+    def amortized_seconds(self) -> Float64Array:
+        """(N,) wall seconds, each refinement spread over the photos since the one before.
+
+        Refinements come in lumps, further and further apart: which hundred photos one falls into
+        is chance. After the last one nothing is known: nan.
+        """
+        seconds = np.array([photo.seconds for photo in self.photos])
+        refinement = np.array([photo.seconds_with_refinement for photo in self.photos]) - seconds
+        spread = np.full(len(seconds), np.nan)
+        start = 0
+        for end in (np.flatnonzero(refinement > 0) + 1).tolist():
+            spread[start:end] = refinement[end - 1] / (end - start)
+            start = end
+        amortized: Float64Array = seconds + spread
+        return amortized
 
     def exponent(self, start: int) -> float:
         """The power of its number that a photo's cost follows, fitted from ``start`` on.
