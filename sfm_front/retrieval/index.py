@@ -22,6 +22,10 @@ from sfm_front.types import Candidate, Float32Array, Uint8Array
 SHORTLIST = 256
 """Photos whose vectors are looked at; four times those asked for where that is more."""
 
+# Photos that a widened query orders anew. All of the shortlist take longer and give the same: of
+# 5063, 0.9334 of the relevant photos were among the first 25, and 0.9338 with the 256.
+_WIDENED = 100
+
 # A vector is rotated as a matrix of this many columns, and this many rows come out.
 _COLUMNS = 128
 _CODE_ROWS = 128
@@ -31,8 +35,8 @@ class CosineIndex:
     """Unit vectors of photos, compared by cosine. Adding is amortised constant time.
 
     Up to ``SHORTLIST`` photos all are compared. With 5063, most of them made up of parts of real
-    ones, 98.0 % of the true 25 nearest by VLAD were found, 99.3 % of the relevant among them, in
-    4.3 ms of one core, where the product with all vectors takes 32 ms. Cosines are good to 0.001.
+    ones, 96.9 % of the true 25 nearest by VLAD were found, 99.5 % of the relevant among them.
+    Cosines are good to 0.001.
     A photo takes a byte a number and 2 kB: 18 kB with VLAD of 16 384 numbers.
     """
 
@@ -74,14 +78,16 @@ class CosineIndex:
         of equals the one added earlier.
 
         ``widen_by``: so many of the best, each times its cosine, are added to the vector, and
-        ``widen_with``: so are these photos. The photos are ordered by what that gives; their
-        cosines remain those with the vector.
+        ``widen_with``: so are these photos. The best 100 or, if that is more, twice as many as are
+        asked for are ordered by what that gives; their cosines remain those with the vector.
         """
         rows = self._shortlist(vector, max(SHORTLIST, 4 * count))
         cosines = scores = self._cosines(vector, rows)
         best = (int(rows[i]) for i in _best(cosines, widen_by))
         companions = {*best, *(self._rows[image_id] for image_id in widen_with)}
         if companions:
+            near = np.sort(_best(cosines, max(_WIDENED, 2 * count)))
+            rows, cosines = rows[near], cosines[near]
             scores = self._cosines(self._widened(vector, sorted(companions)), rows)
         return [
             # Rounding may take the cosine of a vector with itself above 1.
