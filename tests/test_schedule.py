@@ -10,9 +10,12 @@ from sfm_front.errors import ConfigError
 from sfm_front.mapping.schedule import RefinementSchedule, ScheduleOptions
 
 
-def refinements(num_images: int, *, growth: float, points_per_image: int = 200) -> list[int]:
+def refinements(
+    num_images: int, *, growth: float, late_growth: float | None = None, points_per_image: int = 200
+) -> list[int]:
     """The sizes at which a model that grows photo by photo is refined, from 2 photos on."""
-    schedule = RefinementSchedule(ScheduleOptions(growth=growth))
+    options = ScheduleOptions(growth=growth, late_growth=late_growth or growth)
+    schedule = RefinementSchedule(options)
     schedule.refined(2, 2 * points_per_image)
     sizes = []
     for size in range(3, num_images + 1):
@@ -47,14 +50,22 @@ def test_no_model_waits_longer_than_its_growth_allows():
         assert later < 1.25 * earlier + 1
 
 
+def test_a_large_model_may_grow_further():
+    sizes = refinements(2000, growth=1.25, late_growth=1.6)
+    growths = [(earlier, later / earlier) for earlier, later in pairwise(sizes)]
+    assert {growth < 1.3 for size, growth in growths if 20 <= size < 100} == {True}
+    assert {1.6 <= growth < 1.61 for size, growth in growths if size >= 100} == {True}
+
+
 def test_growth_in_points_alone_is_enough():
     schedule = RefinementSchedule(ScheduleOptions(growth=1.5))
-    schedule.refined(100, 1000)
-    assert not schedule.is_due(101, 1499)
-    assert schedule.is_due(101, 1500)
-    assert schedule.is_due(150, 1001)
+    schedule.refined(90, 1000)
+    assert not schedule.is_due(91, 1499)
+    assert schedule.is_due(91, 1500)
+    assert schedule.is_due(135, 1001)
 
 
-def test_without_growth_there_is_no_schedule():
-    with pytest.raises(ConfigError, match="growth must be above 1, got 1"):
-        ScheduleOptions(growth=1.0)
+@pytest.mark.parametrize("name", ["growth", "late_growth"])
+def test_without_growth_there_is_no_schedule(name):
+    with pytest.raises(ConfigError, match=f"{name} must be above 1, got 1"):
+        ScheduleOptions(**{name: 1.0})

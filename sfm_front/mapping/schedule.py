@@ -9,32 +9,37 @@ from sfm_front.errors import ConfigError
 
 @dataclass(frozen=True, kw_only=True)
 class ScheduleOptions:
-    """A model is refined as a whole each time its photos or points have grown by ``growth``.
+    """A model is refined as a whole each time its photos or points have grown by ``growth``; one
+    of ``late_from`` photos or more by ``late_growth``.
 
     Geometric growth keeps the cost of global refinement, summed over a session, proportional to
-    that of the last one.
+    that of the last one. That cost grows faster than the model, and a large model is not bent by
+    what a few photos add.
     """
 
     growth: float = 1.25
+    late_growth: float = 1.6
+    late_from: int = 100
 
     def __post_init__(self) -> None:
-        if self.growth <= 1:
-            raise ConfigError(f"growth must be above 1, got {self.growth}")
+        for name in ("growth", "late_growth"):
+            value = getattr(self, name)
+            if value <= 1:
+                raise ConfigError(f"{name} must be above 1, got {value}")
 
 
 class RefinementSchedule:
     """Remembers the model's size at its last global refinement."""
 
     def __init__(self, options: ScheduleOptions) -> None:
-        self._growth = options.growth
+        self._options = options
         self._num_images = 0
         self._num_points = 0
 
     def is_due(self, num_images: int, num_points: int) -> bool:
-        return (
-            num_images >= self._growth * self._num_images
-            or num_points >= self._growth * self._num_points
-        )
+        late = self._num_images >= self._options.late_from
+        growth = self._options.late_growth if late else self._options.growth
+        return num_images >= growth * self._num_images or num_points >= growth * self._num_points
 
     def refined(self, num_images: int, num_points: int) -> None:
         """Note that the whole model has just been refined at this size."""
