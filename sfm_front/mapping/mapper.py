@@ -59,11 +59,11 @@ class MapperOptions:
     def final(self) -> pycolmap.IncrementalPipelineOptions:
         """As pycolmap takes it, with nearly COLMAP's own patience in bundle adjustment.
 
-        Its own tolerance is 0. A fifth of the end's time went, and the models of three scenes
-        stayed as they were, to the last point and 0.0001 of AUC.
+        Its own tolerance is 0, which gave the same model of a synthetic flight of 400 photos. With
+        1e-5 the flight stayed bent: pose AUC at 1° 0.59 for 0.80.
         """
         options = pycolmap.IncrementalPipelineOptions()
-        options.ba_global_function_tolerance = 1e-5
+        options.ba_global_function_tolerance = 1e-6
         options.num_threads = self.num_threads
         options.random_seed = self.seed
         options.ba_refine_focal_length = self.refine_intrinsics
