@@ -13,9 +13,9 @@ _MAX_SHIFT = 0.025
 # Photos that must share a camera, and the share of the reprojection error that must go.
 _MIN_PHOTOS = 8
 _MIN_GAIN = 0.025
-# Photos from which patience pays. A long flight unbends slowly: 400 synthetic photos ended at a pose
-# AUC of 0.80 at 1° with a tolerance of 1e-4, and at 0.94 with 1e-6; on small models that only takes
-# longer.
+# Photos from which patience pays. A long flight unbends slowly: 400 synthetic photos ended at a
+# pose AUC of 0.80 at 1° with a tolerance of 1e-4, and at 0.94 with 1e-6; on small models that only
+# takes longer.
 _LARGE = 100
 
 
