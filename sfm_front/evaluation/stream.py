@@ -65,7 +65,7 @@ class StreamResult:
         figures["amortized_seconds"] = self.amortized_seconds()
         return Growth(
             **{
-                name: float(np.nanmean(values[late]) / np.nanmean(values[early]))
+                name: float(values[late].mean() / values[early].mean())
                 for name, values in figures.items()
             }
         )
@@ -74,14 +74,14 @@ class StreamResult:
         """(N,) wall seconds, each refinement spread over the photos since the one before.
 
         Refinements come in lumps, further and further apart: which hundred photos one falls into
-        is chance. After the last one nothing is known: nan.
+        is chance. After the last one its share goes on.
         """
         seconds = np.array([photo.seconds for photo in self.photos])
         refinement = np.array([photo.seconds_with_refinement for photo in self.photos]) - seconds
-        spread = np.full(len(seconds), np.nan)
+        spread = np.zeros(len(seconds))
         start = 0
         for end in (np.flatnonzero(refinement > 0) + 1).tolist():
-            spread[start:end] = refinement[end - 1] / (end - start)
+            spread[start:] = refinement[end - 1] / (end - start)
             start = end
         amortized: Float64Array = seconds + spread
         return amortized
