@@ -74,7 +74,7 @@ class Retriever:
         for certain; without any, with its best, as in the coarse step.
         """
         verified = [c for c in reranked if (c.inliers or 0) >= self._reranker.min_inliers]
-        first = [candidate.image_id for candidate in verified]
+        first = {candidate.image_id for candidate in verified}
         others = self._index.query(
             vector,
             len(self),
@@ -82,4 +82,4 @@ class Retriever:
             widen_with=first,
         )
         known = {candidate.image_id: candidate for candidate in reranked}
-        return verified + [known.get(c.image_id, c) for c in others if c.image_id not in set(first)]
+        return verified + [known.get(c.image_id, c) for c in others if c.image_id not in first]
