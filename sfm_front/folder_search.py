@@ -92,11 +92,11 @@ class FolderSearch:
         self._matching = MatchingOptions()
         self._verifier = Verifier()
         matcher = make_matcher(device, self._matching, workers)
-        reranker = Reranker(self._rerank_options(), matcher, self._verifier, workers)
+        self._reranker = Reranker(self._rerank_options(), matcher, self._verifier, workers)
         vectors = workers.map(index.vector, index.photos)
         dimension = len(vectors[0]) if vectors else 0
         self._num_candidates = self._how_many_to_match(len(vectors))
-        self._retriever = Retriever(self._retrieval_options(), dimension, reranker)
+        self._retriever = Retriever(self._retrieval_options(), dimension)
         for image_id, vector in zip(index.photos, vectors, strict=True):
             self._retriever.remember(image_id, vector)
         self._ids = {photo.path.resolve(): image_id for image_id, photo in index.photos.items()}
@@ -111,9 +111,11 @@ class FolderSearch:
             ids = [candidate.image_id for candidate in proposed]
             views = dict(zip(ids, self._workers.map(self._index.__getitem__, ids), strict=True))
         with clock.stage("fine"):
-            reranked = self._retriever.rerank(view_of(query_id, query), proposed, views)
+            reranked = self._reranker.rerank(view_of(query_id, query), proposed, views)
         with clock.stage("rank"):
-            ranked = self._retriever.rank(query.global_vector, reranked)
+            ranked = self._retriever.rank(
+                query.global_vector, reranked, min_inliers=self._verifier.options.min_inliers
+            )
         found = tuple(
             Found(self._index.photos[c.image_id], c.image_id, c.cosine, c.inliers)
             for c in ranked

@@ -95,11 +95,11 @@ class Session(Closing):
         self._workers = Workers(threads)
         self._verifier = Verifier(self.options.verification)
         matcher = make_matcher(device, self.options.matching, self._workers)
-        first_look, second_look = (
+        self._reranker, second_look = (
             Reranker(options, matcher, self._verifier, self._workers)
             for options in (self.options.rerank, self.options.second_look)
         )
-        self._retriever = Retriever(self.options.retrieval, descriptor.dimension, first_look)
+        self._retriever = Retriever(self.options.retrieval, descriptor.dimension)
         self._pairing = Pairing(matcher, second_look)
         self._duplicates = DuplicateFinder()
         self._cameras = CameraCatalog(self.options.cameras)
@@ -165,7 +165,7 @@ class Session(Closing):
         with clock.stage("retrieve"):
             candidates = self._retriever.candidates(photo.global_vector)
         with clock.stage("rerank"):
-            candidates = self._retriever.rerank(
+            candidates = self._reranker.rerank(
                 view, candidates, self._views, enough=self.options.matched
             )
         pairs = self._verify(view, candidates[: self.options.matched], clock)

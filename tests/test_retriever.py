@@ -23,14 +23,16 @@ COSINE_TOLERANCE = 0.01
 @pytest.fixture
 def retriever():
     """It asks for six candidates."""
+    return Retriever(RetrievalOptions(candidates=6), Vlad().dimension)
+
+
+@pytest.fixture
+def reranker():
     with Workers(1) as workers:
-        reranker = Reranker(
-            RerankOptions(), CpuMatcher(MatchingOptions(), workers), Verifier(), workers
-        )
-        yield Retriever(RetrievalOptions(candidates=6), Vlad().dimension, reranker)
+        yield Reranker(RerankOptions(), CpuMatcher(MatchingOptions(), workers), Verifier(), workers)
 
 
-def test_the_most_relevant_photo_is_the_one_that_overlaps_most(retriever):
+def test_the_most_relevant_photo_is_the_one_that_overlaps_most(retriever, reranker):
     scene = make_scene(16, 300, seed=8, layout="orbit")
     views = {}
     for index in range(15):
@@ -42,7 +44,7 @@ def test_the_most_relevant_photo_is_the_one_that_overlaps_most(retriever):
     coarse = retriever.candidates(query.global_vector)
     assert len(coarse) == 6
     assert all(-1 <= candidate.cosine <= 1 for candidate in coarse)
-    fine = retriever.rerank(View(15, scene.camera, query.features), coarse, views)
+    fine = reranker.rerank(View(15, scene.camera, query.features), coarse, views)
     assert sorted(c.image_id for c in fine) == sorted(c.image_id for c in coarse)
     best = max(range(15), key=lambda index: len(true_matches(scene, 15, index)))
     assert fine[0].image_id == best
@@ -53,8 +55,7 @@ def test_the_first_photo_has_no_candidates(retriever):
     scene = make_scene(2, 50, seed=9)
     photo = described(scene, 0)
     assert retriever.candidates(photo.global_vector) == []
-    assert retriever.rerank(View(1, scene.camera, photo.features), [], {}) == []
-    assert retriever.rank(photo.global_vector, []) == []
+    assert retriever.rank(photo.global_vector, [], min_inliers=15) == []
 
 
 def unit(*numbers: float) -> np.ndarray:
@@ -71,7 +72,7 @@ def test_of_the_others_those_like_the_verified_photos_come_first(retriever):
     ):
         retriever.remember(image_id, vector)
     looked = [Candidate(1, 0.447, 40), Candidate(3, 0.371, 14)]
-    found = retriever.rank(query, looked)
+    found = retriever.rank(query, looked, min_inliers=15)
     assert [c.image_id for c in found] == [1, 2, 3, 4]
     assert [c.inliers for c in found] == [40, None, 14, None]
     assert found[1].cosine == pytest.approx(1 / 10**0.5, abs=COSINE_TOLERANCE)
@@ -82,7 +83,7 @@ def test_where_none_was_verified_the_best_by_cosine_stand_in(retriever):
     for image_id, vector in enumerate([unit(1, 2, 0), unit(1, 3, 0), unit(1, 0, 2.5)], 1):
         retriever.remember(image_id, vector)
     (*first,) = retriever.candidates(query)
-    found = retriever.rank(query, [Candidate(1, 0.447, 14)])
+    found = retriever.rank(query, [Candidate(1, 0.447, 14)], min_inliers=15)
     assert [c.image_id for c in found] == [c.image_id for c in first]
     assert found[[c.image_id for c in found].index(1)].inliers == 14
 

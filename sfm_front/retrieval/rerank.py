@@ -37,8 +37,6 @@ class Reranker:
         self._matcher = matcher
         self._verifier = verifier
         self._workers = workers
-        self.min_inliers = verifier.options.min_inliers
-        """With so many a candidate counts as verified."""
 
     def rerank(
         self,
@@ -48,7 +46,8 @@ class Reranker:
         *,
         enough: int | None = None,
     ) -> list[Candidate]:
-        """The same candidates with inliers and turn, most inliers first, ties by cosine.
+        """The same candidates with inliers and turn, most inliers first, ties by cosine: the first
+        is the most relevant photo.
 
         They are taken a dozen at a time, in the order given. Once this many have 30 inliers, those
         that were not looked at yet follow as they are: where 8 were enough of 25, a third was

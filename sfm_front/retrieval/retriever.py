@@ -1,4 +1,4 @@
-"""Hierarchical retrieval: cosine candidates, re-ranked; the most relevant photo first.
+"""The coarse step of hierarchical retrieval, and the order of all photos once it was re-ranked.
 
 Source: Zhan, Zhou and Yang, "A Method of Hierarchical Image Retrieval for Real-Time Photogrammetry
 Based on Multiple Features", IEEE Access 2020, doi 10.1109/ACCESS.2020.2969287. Widening a query
@@ -8,14 +8,12 @@ feature model for object retrieval", ICCV 2007.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
 from sfm_front.retrieval.index import CosineIndex
-from sfm_front.retrieval.rerank import Reranker
 from sfm_front.types import Candidate, Float32Array
-from sfm_front.verification import View
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,10 +34,9 @@ class RetrievalOptions:
 class Retriever:
     """Remembers photos by their global vectors, and ranks them for another one."""
 
-    def __init__(self, options: RetrievalOptions, dimension: int, reranker: Reranker) -> None:
+    def __init__(self, options: RetrievalOptions, dimension: int) -> None:
         self._options = options
         self._index = CosineIndex(dimension)
-        self._reranker = reranker
 
     def __len__(self) -> int:
         return len(self._index)
@@ -53,27 +50,15 @@ class Retriever:
         options = self._options
         return self._index.query(vector, options.candidates, widen_by=options.widen_by)
 
-    def rerank(
-        self,
-        query: View,
-        candidates: Sequence[Candidate],
-        views: Mapping[int, View],
-        *,
-        enough: int | None = None,
+    def rank(
+        self, vector: Float32Array, reranked: Sequence[Candidate], *, min_inliers: int
     ) -> list[Candidate]:
-        """The fine step: candidates by verified matches; the first is the most relevant photo.
-
-        ``enough``: see ``Reranker.rerank``.
-        """
-        return self._reranker.rerank(query, candidates, views, enough=enough)
-
-    def rank(self, vector: Float32Array, reranked: Sequence[Candidate]) -> list[Candidate]:
-        """All photos: candidates that were verified, as re-ranked, then the others.
+        """All photos: candidates with so many inliers, as re-ranked, then the others.
 
         The others are ordered by the vector widened with the verified ones, which show the same
         for certain; without any, with its best, as in the coarse step.
         """
-        verified = [c for c in reranked if (c.inliers or 0) >= self._reranker.min_inliers]
+        verified = [c for c in reranked if (c.inliers or 0) >= min_inliers]
         first = {candidate.image_id for candidate in verified}
         others = self._index.query(
             vector,

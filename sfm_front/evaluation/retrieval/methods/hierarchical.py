@@ -38,10 +38,11 @@ class Hierarchical:
             self.name = f"{self.name}:{vector}"
         self.global_vectors = (vector,)
         self._retrieval = retrieval or RetrievalOptions()
+        self._verifier = Verifier()
         self._reranker = Reranker(
             rerank or RerankOptions(),
             CpuMatcher(MatchingOptions(), workers),
-            Verifier(),
+            self._verifier,
             workers,
         )
         self.seconds: Mapping[str, float] = {}
@@ -49,7 +50,7 @@ class Hierarchical:
 
     def build(self, photos: Sequence[BenchPhoto]) -> None:
         dimension = len(photos[0].vectors[self.vector]) if photos else 0
-        self._retriever = Retriever(self._retrieval, dimension, self._reranker)
+        self._retriever = Retriever(self._retrieval, dimension)
         self._views = {photo.view.image_id: photo.view for photo in photos}
         for photo in photos:
             self._retriever.remember(photo.view.image_id, photo.vectors[self.vector])
@@ -60,9 +61,9 @@ class Hierarchical:
         with clock.stage("coarse"):
             proposed = self._retriever.candidates(vector)
         with clock.stage("fine"):
-            reranked = self._retriever.rerank(query.view, proposed, self._views)
+            reranked = self._reranker.rerank(query.view, proposed, self._views)
         self.seconds = clock.seconds
-        return [
-            Ranked(c.image_id, -place, c.cosine, c.inliers)
-            for place, c in enumerate(self._retriever.rank(vector, reranked))
-        ]
+        ranked = self._retriever.rank(
+            vector, reranked, min_inliers=self._verifier.options.min_inliers
+        )
+        return [Ranked(c.image_id, -place, c.cosine, c.inliers) for place, c in enumerate(ranked)]
