@@ -9,6 +9,7 @@ from pathlib import Path
 from sfm_front.cameras import CameraOptions
 from sfm_front.errors import ConfigError
 from sfm_front.features.sift import SiftExtractor
+from sfm_front.guided import GuidedOptions
 from sfm_front.images import PhotoReader
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.matching import MatchingOptions
@@ -31,7 +32,8 @@ class SessionOptions:
     knows; ``weights``: a file for its network; ``device``: ``auto``, ``cpu`` or
     ``cuda``, of the network and of matching. ``rerank``: the look that ranks candidates;
     ``second_look``: at those of which it told too little.
-    ``matched``: re-ranked photos that are matched in full. ``threads``: cores to use.
+    ``matched``: re-ranked photos that are matched; ``unguided``: the best of them, on all features
+    whatever is known of their poses. ``threads``: cores to use.
     ``text``: write models in COLMAP's text form too.
     """
 
@@ -41,6 +43,7 @@ class SessionOptions:
     weights: Path | None = None
     device: str = "auto"
     matched: int = 8
+    unguided: int = 3
     text: bool = False
     threads: int = field(default_factory=available_cores)
     cameras: CameraOptions = field(default_factory=CameraOptions)
@@ -48,12 +51,15 @@ class SessionOptions:
     rerank: RerankOptions = field(default_factory=RerankOptions)
     second_look: RerankOptions = field(default_factory=lambda: RerankOptions(max_features=2000))
     matching: MatchingOptions = field(default_factory=MatchingOptions)
+    guided: GuidedOptions = field(default_factory=GuidedOptions)
     verification: VerificationOptions = field(default_factory=VerificationOptions)
     atlas: AtlasOptions = field(default_factory=AtlasOptions)
 
     def __post_init__(self) -> None:
         if self.matched < 1:
             raise ConfigError(f"matched must be at least 1, got {self.matched}")
+        if self.unguided < 1:
+            raise ConfigError(f"unguided must be at least 1, got {self.unguided}")
         if self.threads < 1:
             raise ConfigError(f"threads must be at least 1, got {self.threads}")
         # These check themselves: here, so that it is done before a session has written anything.

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sfm_front.meetings import Block, Meetings
 from sfm_front.types import Float32Array
 
 _FULL_TURN = 2 * np.pi
 # Of the verified matches of nine scenes, 87 to 99 % are turned within this of the pair's common
 # turn; 74 % in opensfm_lund, where facades stand aslant, and many pairs have no common turn.
 TOLERANCE_RAD = np.deg2rad(20)
+_MATCH_TOLERANCE_RAD = np.deg2rad(30)
 _MIN_MATCHES = 16
 _MIN_AGREEING = 0.75
 NUM_SECTORS = 24
@@ -33,20 +34,16 @@ def common_turn(keypoints1: Float32Array, keypoints2: Float32Array) -> float | N
     return common if agreeing.mean() >= _MIN_AGREEING else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sectors:
-    """Features in the order of their orientation, cut so that only alike ones meet.
-
-    ``order1`` (N,) and ``order2`` (M',): indices of features, those near the cut of the circle
-    twice in the second. ``blocks``: slices of both orders to be compared with each other.
-    """
-
-    order1: NDArray[np.intp]
-    order2: NDArray[np.intp]
-    blocks: tuple[tuple[slice, slice], ...]
+def turned_alike(
+    keypoints1: Float32Array, keypoints2: Float32Array, turn_rad: float
+) -> NDArray[np.bool_]:
+    """(M,) whether matching keypoints (M, 4) turn by so much, 30 degrees more or less."""
+    apart = np.mod(keypoints2[:, 3] - keypoints1[:, 3] - turn_rad + np.pi, _FULL_TURN) - np.pi
+    alike: NDArray[np.bool_] = np.abs(apart) < _MATCH_TOLERANCE_RAD
+    return alike
 
 
-def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: float) -> Sectors:
+def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: float) -> Meetings:
     """Features (N,) and (M,) that may match where photo 2 is turned by this against photo 1.
 
     Each feature of photo 1 meets those of photo 2 within 20 degrees of where the turn takes it,
@@ -58,18 +55,18 @@ def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: 
     found = found[order2]
     below, above = np.searchsorted(found, (TOLERANCE_RAD, _FULL_TURN - TOLERANCE_RAD))
     circle = np.concatenate([found[above:] - _FULL_TURN, found, found[:below] + _FULL_TURN])
-    return Sectors(
+    return Meetings(
         order1,
         np.concatenate([order2[above:], order2, order2[:below]]),
-        tuple(_blocks(expected[order1], circle)),
+        _blocks(expected[order1], circle),
     )
 
 
-def _blocks(expected: Float32Array, found: Float32Array) -> Iterator[tuple[slice, slice]]:
+def _blocks(expected: Float32Array, found: Float32Array) -> Iterator[Block]:
     edges = np.linspace(0, _FULL_TURN, NUM_SECTORS + 1)
     rows = np.searchsorted(expected, edges)
     rows[-1] = len(expected)
     first = np.searchsorted(found, edges[:-1] - TOLERANCE_RAD)
     last = np.searchsorted(found, edges[1:] + TOLERANCE_RAD)
     for sector in range(NUM_SECTORS):
-        yield slice(rows[sector], rows[sector + 1]), slice(first[sector], last[sector])
+        yield Block(slice(rows[sector], rows[sector + 1]), slice(first[sector], last[sector]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pycolmap
@@ -18,6 +19,7 @@ from sfm_front.export import export_models
 from sfm_front.features.colmap_sift import ColmapSift
 from sfm_front.features.global_descriptor import resolve
 from sfm_front.features.sift import SiftExtractor
+from sfm_front.guided import GuidedPairing
 from sfm_front.images import DuplicateFinder, PhotoReader
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.scene import Scene
@@ -101,6 +103,9 @@ class Session(Closing):
         )
         self._retriever = Retriever(self.options.retrieval, descriptor.dimension)
         self._pairing = Pairing(matcher, second_look)
+        self._guided = GuidedPairing(
+            self.options.guided, self.options.matching, self.options.verification, self._workers
+        )
         self._duplicates = DuplicateFinder()
         self._cameras = CameraCatalog(self.options.cameras)
         self._store = Store(database)
@@ -168,7 +173,9 @@ class Session(Closing):
             candidates = self._reranker.rerank(
                 view, candidates, self._views, enough=self.options.matched
             )
-        pairs = self._verify(view, candidates[: self.options.matched], clock)
+        pairs = self._match(view, candidates[: self.options.unguided], clock)
+        further = candidates[self.options.unguided : self.options.matched]
+        pairs += self._match_guided(view, further, pairs, clock)
         with clock.stage("store"):
             self._store.write(image_id, photo, camera, pairs)
         with clock.stage("map"):
@@ -182,7 +189,8 @@ class Session(Closing):
         return StepReport(
             name=photo.name,
             image_id=image_id,
-            candidates=tuple(candidates),
+            # Reports are kept to the end; what was matched is in the database.
+            candidates=tuple(replace(candidate, matches=None) for candidate in candidates),
             most_relevant=self._names[candidates[0].image_id] if candidates else None,
             num_keypoints=len(photo.features),
             verified=tuple(self._names[pair.image_id2] for pair in pairs),
@@ -193,10 +201,10 @@ class Session(Closing):
             events=self._atlas.take_events(),
         )
 
-    def _verify(
+    def _match(
         self, view: View, candidates: Sequence[Candidate], clock: Stopwatch
     ) -> list[PairGeometry]:
-        """Match a photo with its best candidates on all features; keep the verified pairs."""
+        """Match a photo with candidates on all features; keep the verified pairs."""
 
         def verify_with(tentative: tuple[View, Uint32Array]) -> PairGeometry | Rejection:
             return self._verifier.verify(view, *tentative)
@@ -206,6 +214,28 @@ class Session(Closing):
         with clock.stage("verify"):
             verified = self._workers.map(verify_with, matches)
         return [pair for pair in verified if isinstance(pair, PairGeometry)]
+
+    def _match_guided(
+        self,
+        view: View,
+        candidates: Sequence[Candidate],
+        pairs: Sequence[PairGeometry],
+        clock: Stopwatch,
+    ) -> list[PairGeometry]:
+        """Match with further candidates where the pose that follows from the pairs has them.
+
+        Those that it tells nothing of are matched like the first ones.
+        """
+        with clock.stage("locate"):
+            posed = self._atlas.locate(view.camera.camera_id, view.features.keypoints, pairs)
+        guided: list[PairGeometry] = []
+        if posed is not None:
+            with clock.stage("guide"):
+                others = self._atlas.posed(candidate.image_id for candidate in candidates)
+                guided = self._guided.match(view, posed, candidates, self._views, others)
+        found = {pair.image_id2 for pair in guided}
+        left = [candidate for candidate in candidates if candidate.image_id not in found]
+        return guided + self._match(view, left, clock)
 
 
 def _extractor(device: str, max_features: int) -> FeatureExtractor:

@@ -130,13 +130,15 @@ class Candidate:
 
     ``cosine`` of the global vectors in [-1, 1]; ``inliers``: SIFT matches that survived RANSAC,
     None where the candidate was not re-ranked; ``turn_rad``: how far keypoints turn from the query
-    to the candidate in the image plane, None where that is not known.
+    to the candidate in the image plane, None where that is not known; ``matches`` (K, 2): these
+    inliers, keypoint indices in the query and in the candidate.
     """
 
     image_id: int
     cosine: float
     inliers: int | None = None
     turn_rad: float | None = None
+    matches: Uint32Array | None = field(default=None, repr=False, compare=False)
 
 
 class Rejection(Enum):

@@ -8,15 +8,21 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic import make_scene
-from sfm_front.matching import MatchingOptions, match, match_turned
+from sfm_front.matching import MatchingOptions, match, match_meeting, match_turned
+from sfm_front.meetings import Block, Meetings
 from sfm_front.types import Features
 
 
 def brute_force(
-    first: NDArray[np.uint8], second: NDArray[np.uint8], options: MatchingOptions
+    first: NDArray[np.uint8],
+    second: NDArray[np.uint8],
+    options: MatchingOptions,
+    apart: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int64]:
     """(K, 2): the angle of the nearest is small enough, and small beside the second nearest's."""
     cosine = (first.astype(np.int64) @ second.astype(np.int64).T) / 512.0**2
+    if apart is not None:
+        cosine[apart] = 0
     rows = []
     for i in range(len(first)):
         best, next_best = np.argsort(-cosine[i], kind="stable")[:2]
@@ -107,6 +113,28 @@ def test_a_strided_selection_of_descriptors_is_fine(neighbours):
         match(neighbours[0][::2], neighbours[1][::2], MatchingOptions()),
         match(first, second, MatchingOptions()),
     )
+
+
+def test_of_those_that_meet_it_equals_brute_force(neighbours):
+    first, second = neighbours
+    options = MatchingOptions(max_ratio=0.9)
+    rng = np.random.default_rng(1)
+    order1, order2 = rng.permutation(len(first)), rng.permutation(len(second))[:-20]
+    meet = rng.random((len(order1), len(order2))) < 0.5
+    half = len(order1) // 2
+    even, every = np.arange(0, len(order2), 2), slice(0, len(order2))
+    blocks = (
+        Block(slice(0, half), even, meet[:half, even]),
+        Block(slice(half, len(order1)), every, meet[half:]),
+    )
+    found = match_meeting(first, second, Meetings(order1, order2, blocks), options)
+
+    apart = np.ones((len(first), len(second)), np.bool_)
+    apart[np.ix_(order1[:half], order2[even])] = ~meet[:half, even]
+    apart[np.ix_(order1[half:], order2)] = ~meet[half:]
+    expected = brute_force(first, second, options, apart)
+    assert len(expected) > 20
+    np.testing.assert_array_equal(found, expected)
 
 
 def oriented(descriptors: NDArray[np.uint8], orientations: NDArray[np.float64]) -> Features:

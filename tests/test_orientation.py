@@ -55,7 +55,7 @@ def test_those_that_agree_meet_once_and_those_that_do_not_never(turn):
     first, second = rng.uniform(-2, 8, 300), rng.uniform(-2, 8, 400)
     plan = sectors(first, second, turn)
     met = np.zeros((300, 400), int)
-    for rows, columns in plan.blocks:
+    for rows, columns, _ in plan.blocks:
         met[np.ix_(plan.order1[rows], plan.order2[columns])] += 1
     apart = angle_between(first[:, None] + turn, second[None])
     assert met.max() == 1
@@ -67,5 +67,5 @@ def test_those_that_agree_meet_once_and_those_that_do_not_never(turn):
 @pytest.mark.parametrize(("count1", "count2"), [(0, 4), (4, 0), (0, 0)])
 def test_photos_without_features_are_fine(count1, count2):
     plan = sectors(np.zeros(count1, np.float32), np.zeros(count2, np.float32), 1.0)
-    assert sum((rows.stop - rows.start) for rows, _ in plan.blocks) == count1
-    assert all(columns.stop - columns.start == 0 for _, columns in plan.blocks) or count2
+    assert sum((rows.stop - rows.start) for rows, _, _ in plan.blocks) == count1
+    assert all(columns.stop - columns.start == 0 for _, columns, _ in plan.blocks) or count2

@@ -12,6 +12,7 @@ from sfm_front.mapping.polish import PolishOptions, polish
 
 FOCAL_PX, WIDTH, HEIGHT = 1000.0, 1024, 768
 OFF_CENTRE = (WIDTH / 2 + 8.0, HEIGHT / 2 - 10.0)
+MAX_ERROR_PX = 4.0
 FAR_OFF = (WIDTH / 2 + 60.0, HEIGHT / 2)
 
 
@@ -70,6 +71,18 @@ def test_otherwise_it_stays_in_the_middle(point, photos, prior, refine):
     model.camera(next(iter(model.cameras))).has_prior_focal_length = prior
     polished = polish(model, PolishOptions(refine_intrinsics=refine))
     assert principal_point(polished) == [WIDTH / 2, HEIGHT / 2]
+
+
+def test_points_that_do_not_fit_are_dropped():
+    model = truth((WIDTH / 2, HEIGHT / 2))
+    wrong = sorted(model.points3D)[:5]
+    for point_id in wrong:
+        element = model.point3D(point_id).track.elements[0]
+        image = model.image(element.image_id)
+        image.points2D[element.point2D_idx].xy = [WIDTH - 1.0, HEIGHT - 1.0]
+    polished = polish(centred(model), PolishOptions())
+    assert len(polished.points3D) > 250
+    assert max(point.error for point in polished.points3D.values()) < MAX_ERROR_PX
 
 
 def test_wrong_matches_weigh_less_than_in_least_squares():

@@ -25,6 +25,7 @@ from sfm_front.types import ModelSummary, Skipped, SkipReason, StepReport
 NUM_PHOTOS = 16
 # The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
 POSITION_TOLERANCE_M = 0.3
+ESSENTIAL_TOLERANCE = 1e-3
 OUTLIERS = 0.05
 
 
@@ -114,6 +115,30 @@ def test_a_step_says_what_was_retrieved_and_placed(orbit, session):
     assert sorted(names) == [orbit.name(index) for index in range(NUM_PHOTOS)]
     assert last.num_registered == NUM_PHOTOS
     assert {"retrieve", "rerank", "match", "verify", "store", "map"} <= set(last.seconds)
+
+
+def test_a_photo_that_can_be_located_is_matched_guided(session):
+    output, steps, _ = session
+    assert "guide" not in steps[1].seconds
+    assert "guide" in steps[-1].seconds
+    with pycolmap.Database.open(output / "database.db") as database:
+        geometries = [
+            database.read_two_view_geometry(NUM_PHOTOS, image_id)
+            for image_id in range(1, NUM_PHOTOS)
+            if database.exists_two_view_geometry(NUM_PHOTOS, image_id)
+        ]
+    assert len(geometries) == len(steps[-1].verified) > SessionOptions().unguided
+    # Each says where the photos stand to each other, in the same way whoever found it.
+    for geometry in geometries:
+        assert np.linalg.norm(geometry.cam2_from_cam1.translation) == pytest.approx(1)
+        essential = pycolmap.essential_matrix_from_pose(geometry.cam2_from_cam1)
+        cosine = (essential * geometry.E).sum() / np.linalg.norm(essential)
+        assert abs(cosine) / np.linalg.norm(geometry.E) > 1 - ESSENTIAL_TOLERANCE
+
+
+def test_a_report_does_not_hold_on_to_matches(session):
+    _, steps, _ = session
+    assert all(c.matches is None for step in steps for c in step.candidates)
 
 
 def test_reports_are_written(session):
@@ -224,6 +249,7 @@ def test_a_session_does_not_write_over_another(session):
     ("wrong", "message"),
     [
         ({"matched": 0}, "matched must be at least 1, got 0"),
+        ({"unguided": 0}, "unguided must be at least 1, got 0"),
         ({"threads": 0}, "threads must be at least 1, got 0"),
         ({"global_descriptor": "bag"}, "no global descriptor is called 'bag'"),
         ({"max_features": 0}, "max_features must be at least 1"),

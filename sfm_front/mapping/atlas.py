@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
+from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
 from sfm_front.mapping.mapper import MapperOptions, Model
 from sfm_front.mapping.scene import Scene
+from sfm_front.posed import Posed
 from sfm_front.stopwatch import Stopwatch
+from sfm_front.types import Float32Array, PairGeometry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +34,7 @@ class AtlasOptions:
     max_failures: int = 1
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)
+    localization: LocalizationOptions = field(default_factory=LocalizationOptions)
 
 
 class Atlas:
@@ -99,6 +103,26 @@ class Atlas:
         if image_id in self.waiting:
             self._start_near(image_id)
         return sorted(self.registered - before)
+
+    def locate(
+        self, camera_id: int, keypoints: Float32Array, pairs: Iterable[PairGeometry]
+    ) -> Posed | None:
+        """Pose in the largest model of a photo that is not in the scene yet, by these pairs.
+
+        None where they do not tell.
+        """
+        if not self.models:
+            return None
+        model = self.models[0].reconstruction
+        return locate(model, camera_id, keypoints, pairs, self._options.localization)
+
+    def posed(self, image_ids: Iterable[int]) -> dict[int, Posed]:
+        """Cameras and poses of those of these photos that are in the largest model."""
+        if not self.models:
+            return {}
+        model = self.models[0].reconstruction
+        found = {image_id: registered_photo(model, image_id) for image_id in image_ids}
+        return {image_id: posed for image_id, posed in found.items() if posed is not None}
 
     def finish(self) -> None:
         """Retry what waits, start afresh where the stream began badly, refine everything."""

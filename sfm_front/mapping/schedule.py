@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
 
+# Photos from which a model is refined seldom, and its last adjustments go on for long. A long
+# flight unbends slowly; on small models patience only takes longer.
+LARGE = 100
+
 
 @dataclass(frozen=True, kw_only=True)
 class ScheduleOptions:
@@ -19,7 +23,7 @@ class ScheduleOptions:
 
     growth: float = 1.25
     late_growth: float = 1.6
-    late_from: int = 100
+    late_from: int = LARGE
 
     def __post_init__(self) -> None:
         for name in ("growth", "late_growth"):

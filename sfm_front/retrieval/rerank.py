@@ -80,6 +80,6 @@ class Reranker:
             turn_rad = common_turn(
                 query.features.keypoints[inliers[:, 0]], view.features.keypoints[inliers[:, 1]]
             )
-            return replace(candidate, inliers=len(inliers), turn_rad=turn_rad)
+            return replace(candidate, inliers=len(inliers), turn_rad=turn_rad, matches=inliers)
 
         return self._workers.map(verify, zip(candidates, matches, strict=True))

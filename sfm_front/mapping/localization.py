@@ -1,0 +1,104 @@
+"""Where a photo stands in a model, by the points that its first verified pairs lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pycolmap
+
+from sfm_front.errors import ConfigError
+from sfm_front.posed import Posed
+from sfm_front.types import Float32Array, Float64Array, PairGeometry, Uint32Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalizationOptions:
+    """``max_error_px``: reprojection error of an inlier, in pixels of the file. ``min_inliers``
+    and ``min_share`` of the points: that a pose must fit. ``sample``: points of each pair that are
+    looked at. ``seed``: of the sample and of RANSAC."""
+
+    max_error_px: float = 8.0
+    min_inliers: int = 30
+    min_share: float = 0.5
+    sample: int = 100
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.max_error_px <= 0:
+            raise ConfigError(f"max_error_px must be above 0, got {self.max_error_px}")
+        if self.min_inliers < 4:
+            raise ConfigError(f"min_inliers must be at least 4, got {self.min_inliers}")
+        if not 0 <= self.min_share <= 1:
+            raise ConfigError(f"min_share must be from 0 to 1, got {self.min_share}")
+        if self.sample < 1:
+            raise ConfigError(f"sample must be at least 1, got {self.sample}")
+
+
+def registered_photo(reconstruction: pycolmap.Reconstruction, image_id: int) -> Posed | None:
+    """Camera and pose of a photo of a model; None where it is not in it."""
+    if not reconstruction.exists_image(image_id):
+        return None
+    image = reconstruction.image(image_id)
+    if not image.has_pose:
+        return None
+    return Posed(reconstruction.camera(image.camera_id), image.cam_from_world())
+
+
+def locate(
+    reconstruction: pycolmap.Reconstruction,
+    camera_id: int,
+    keypoints: Float32Array,
+    pairs: Iterable[PairGeometry],
+    options: LocalizationOptions,
+) -> Posed | None:
+    """Pose of a photo with keypoints (N, 4) by its pairs with photos of a model.
+
+    The camera is the model's. None where the model has none, or too few points fit a pose.
+    """
+    if not reconstruction.exists_camera(camera_id):
+        return None
+    xy, xyz = _seen(reconstruction, keypoints, pairs, options)
+    if len(xy) < options.min_inliers:
+        return None
+    estimation = pycolmap.AbsolutePoseEstimationOptions()
+    estimation.ransac.max_error = options.max_error_px
+    estimation.ransac.random_seed = options.seed
+    camera = reconstruction.camera(camera_id)
+    found = pycolmap.estimate_and_refine_absolute_pose(xy, xyz, camera, estimation)
+    if found is None:
+        return None
+    if found["num_inliers"] < max(options.min_inliers, options.min_share * len(xy)):
+        return None
+    return Posed(camera, found["cam_from_world"])
+
+
+def _seen(
+    reconstruction: pycolmap.Reconstruction,
+    keypoints: Float32Array,
+    pairs: Iterable[PairGeometry],
+    options: LocalizationOptions,
+) -> tuple[Float64Array, Float64Array]:
+    """(K, 2) pixels of keypoints and (K, 3) points of the model that matches lead them to."""
+    point_of: dict[int, Float64Array] = {}
+    for pair in pairs:
+        if registered_photo(reconstruction, pair.image_id2) is None:
+            continue
+        image = reconstruction.image(pair.image_id2)
+        for index, other in _triangulated(pair, image, options).tolist():
+            point_of[index] = reconstruction.point3D(image.point2D(other).point3D_id).xyz
+    xy = keypoints[list(point_of), :2].astype(np.float64)
+    return xy, np.array(list(point_of.values()), np.float64).reshape(-1, 3)
+
+
+def _triangulated(
+    pair: PairGeometry, image: pycolmap.Image, options: LocalizationOptions
+) -> Uint32Array:
+    """(K, 2) of the pair's inliers, a sample of those whose second keypoint shows a point."""
+    matches = pair.two_view_geometry.inlier_matches
+    matches = matches[np.isin(matches[:, 1], image.get_observation_point2D_idxs())]
+    if len(matches) <= options.sample:
+        return matches
+    rng = np.random.default_rng(options.seed)
+    return matches[rng.choice(len(matches), options.sample, replace=False)]

@@ -1,0 +1,39 @@
+"""A photo whose camera and pose are known: where it stands, and what its keypoints look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pycolmap
+
+from sfm_front.types import Float32Array, Float64Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posed:
+    """A photo's camera and pose in the frame of a model."""
+
+    camera: pycolmap.Camera
+    cam_from_world: pycolmap.Rigid3d
+
+    @property
+    def center(self) -> Float64Array:
+        """(3,) of projection, in the frame of the model."""
+        return np.asarray(self.cam_from_world.inverse().translation, np.float64)
+
+    def rays(self, keypoints: Float32Array) -> Float64Array:
+        """(N, 3) directions of keypoints (N, 4) in the frame of the model, of length 1.
+
+        nan where undistortion fails.
+        """
+        undistorted = self.camera.cam_from_img(keypoints[:, :2].astype(np.float64))
+        rays = np.column_stack([np.asarray(undistorted, np.float64), np.ones(len(keypoints))])
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        directions: Float64Array = rays @ self.cam_from_world.rotation.matrix()
+        return directions
+
+    def relative(self, other: Posed) -> pycolmap.Rigid3d:
+        """Pose of the other photo, as seen from this one: cam2_from_cam1, translation as long as
+        the baseline."""
+        return other.cam_from_world * self.cam_from_world.inverse()
