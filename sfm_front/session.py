@@ -174,8 +174,8 @@ class Session(Closing):
                 view, candidates, self._views, enough=self.options.matched
             )
         pairs = self._match(view, candidates[: self.options.unguided], clock)
-        further = candidates[self.options.unguided : self.options.matched]
-        pairs += self._match_guided(view, further, pairs, clock)
+        if further := candidates[self.options.unguided : self.options.matched]:
+            pairs += self._match_guided(view, further, pairs, clock)
         with clock.stage("store"):
             self._store.write(image_id, photo, camera, pairs)
         with clock.stage("map"):
