@@ -32,8 +32,9 @@ class SessionOptions:
     knows; ``weights``: a file for its network; ``device``: ``auto``, ``cpu`` or
     ``cuda``, of the network and of matching. ``rerank``: the look that ranks candidates;
     ``second_look``: at those of which it told too little.
-    ``matched``: re-ranked photos that are matched; ``unguided``: the best of them, on all features
-    whatever is known of their poses. ``threads``: cores to use.
+    ``matched``: re-ranked photos that are matched on all features; ``unguided``: so many of them,
+    the best, come first, and where they tell the pose it guides the others. ``threads``: cores to
+    use.
     ``text``: write models in COLMAP's text form too.
     """
 

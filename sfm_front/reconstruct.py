@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     retrieval = parser.add_argument_group("retrieval")
     shared.add_retrieval(retrieval)
     retrieval.add_argument(
-        "--matched", type=int, metavar="N", help="best of them matched in full (default: 8)"
+        "--matched", type=int, metavar="N", help="best of them matched on all features (default: 8)"
     )
     shared.add_machine(parser)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from threading import Lock
+from typing import ClassVar, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -18,8 +19,13 @@ class Workers(Closing):
     """Maps a function over items on ``num_threads`` threads; results come in the items' order.
 
     While it is open, matrix products and two-view estimates run on the thread that asks for them:
-    split over all cores, they would have the threads wait for each other.
+    split over all cores, they would have the threads wait for each other. That limit is the
+    process's: the first to be opened sets it, the last to be closed takes it away.
     """
+
+    _lock: ClassVar[Lock] = Lock()
+    _open: ClassVar[set[Workers]] = set()
+    _limits: ClassVar[threadpool_limits | None] = None
 
     def __init__(self, num_threads: int) -> None:
         self.num_threads = num_threads
@@ -28,7 +34,10 @@ class Workers(Closing):
             if num_threads > 1
             else None
         )
-        self._limits = threadpool_limits(1)
+        with self._lock:
+            if not self._open:
+                Workers._limits = threadpool_limits(1)
+            self._open.add(self)
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
         if self._pool is None:
@@ -38,4 +47,8 @@ class Workers(Closing):
     def close(self) -> None:
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
-        self._limits.restore_original_limits()
+        with self._lock:
+            self._open.discard(self)
+            if not self._open and Workers._limits is not None:
+                Workers._limits.restore_original_limits()
+                Workers._limits = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 
+import numpy as np
 import pytest
 import threadpoolctl
 
@@ -39,6 +40,7 @@ def test_several_threads_work_side_by_side():
 
 
 def blas_threads() -> set[int]:
+    np.ones((2, 2)) @ np.ones((2, 2))  # whatever was imported before, BLAS is there
     libraries = threadpoolctl.threadpool_info()
     return {library["num_threads"] for library in libraries if library["user_api"] == "blas"}
 
@@ -49,6 +51,18 @@ def test_matrix_products_stay_on_their_thread_while_the_workers_are_there():
         with Workers(2) as workers:
             assert workers.map(lambda _: blas_threads(), range(4)) == [{1}] * 4
         assert blas_threads() == before != {1}
+
+
+def test_the_last_workers_to_be_closed_give_the_cores_back():
+    with threadpoolctl.threadpool_limits(2, user_api="blas"):
+        before = blas_threads()
+        first, second = Workers(1), Workers(1)
+        first.close()
+        assert blas_threads() == {1}
+        second.close()
+        assert blas_threads() == before != {1}
+        second.close()
+        assert blas_threads() == before
 
 
 @pytest.mark.parametrize("num_threads", [1, 2])
