@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import pycolmap
 
 from sfm_front.errors import ConfigError
+from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.polish import PolishOptions, polish
 from sfm_front.mapping.scene import Scene
 from sfm_front.mapping.schedule import LARGE, RefinementSchedule, ScheduleOptions
@@ -81,7 +82,6 @@ class MapperOptions:
         photos, 15 781 points for 15 782, 0.178 px).
         """
         options = self.final(0)
-        options.ba_local_max_refinements = 1
         options.ba_local_function_tolerance = 1e-4
         options.ba_local_max_num_iterations = 12
         options.ba_global_max_refinements = 2
@@ -103,7 +103,7 @@ class Model:
         self._streaming = options.streaming()
         self._mapping = self._streaming.get_mapper()
         self._triangulation = self._streaming.get_triangulation()
-        self._local = self._streaming.get_local_bundle_adjustment()
+        self._local = LocalRefinement(self._streaming)
         self._schedule = RefinementSchedule(options.schedule)
         self._seen_at_failure: dict[int, int] = {}
         self._mapper, self.reconstruction = scene.new_mapper()
@@ -170,7 +170,7 @@ class Model:
             left.discard(image_id)
             if self._register(image_id):
                 placed.append(image_id)
-                self._refine_around(image_id)
+                self._local.add(self._mapper, image_id)
                 if self._schedule.is_due(self.num_registered, self.num_points):
                     self._refine(self._streaming)
         return placed
@@ -186,7 +186,7 @@ class Model:
                 continue
             if self._mapper.register_next_structure_less_image(self._mapping, image_id):
                 self._mapper.triangulate_image(self._triangulation, image_id)
-                self._refine_around(image_id)
+                self._local.add(self._mapper, image_id)
                 placed.append(image_id)
         return placed
 
@@ -264,17 +264,6 @@ class Model:
         self._seen_at_failure[image_id] = num_visible
         return False
 
-    def _refine_around(self, image_id: int) -> None:
-        self._mapper.iterative_local_refinement(
-            self._streaming.ba_local_max_refinements,
-            self._streaming.ba_local_max_refinement_change,
-            self._mapping,
-            self._local,
-            self._triangulation,
-            image_id,
-        )
-        self._mapper.clear_modified_points3D()
-
     def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
         with self._clock.stage("refine"):
             # pycolmap does not count a later photo's correspondences to registered ones; taking a
@@ -288,6 +277,7 @@ class Model:
                 pipeline.get_global_bundle_adjustment(),
                 self._triangulation,
             )
+        self._local.forget(self._mapper)
         self._note_refined()
 
     def _note_refined(self) -> None:

@@ -11,6 +11,14 @@ from sfm_front.errors import ConfigError
 LARGE = 100
 
 
+_PHOTOS_A_SHARE = 250
+
+
+def photos_together(num_images: int) -> int:
+    """How many new photos of a model of this size share a local refinement."""
+    return 1 + num_images // _PHOTOS_A_SHARE
+
+
 @dataclass(frozen=True, kw_only=True)
 class ScheduleOptions:
     """A model is refined as a whole each time its photos or points have grown by ``growth``; one

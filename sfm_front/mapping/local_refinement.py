@@ -1,0 +1,75 @@
+"""Bundle adjustment around the newest photos of a model."""
+
+from __future__ import annotations
+
+import pycolmap
+
+from sfm_front.mapping.schedule import photos_together
+
+# A point in more photos than this is left as it is: it hardly moves, and brings all of them in.
+_MAX_TRACK_LENGTH = 15
+
+
+class LocalRefinement:
+    """COLMAP's local refinement, for one photo at a time or, in a large model, for several.
+
+    Whatever it adjusts, COLMAP checks the whole model for consistency first: 5 ms at 12 000 points
+    and 24 ms at 35 000. Photos that share the adjustment share that, so that a photo costs the same
+    in a large model.
+    """
+
+    def __init__(self, options: pycolmap.IncrementalPipelineOptions) -> None:
+        self._mapping = options.get_mapper()
+        self._triangulation = options.get_triangulation()
+        self._adjustment = options.get_local_bundle_adjustment()
+        self._waiting: list[int] = []
+
+    def add(self, mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
+        """Refine around a photo that was just registered and triangulated, at once or later."""
+        self._waiting.append(image_id)
+        if len(self._waiting) >= photos_together(mapper.reconstruction.num_reg_images()):
+            self._refine(mapper)
+            self.forget(mapper)
+
+    def forget(self, mapper: pycolmap.IncrementalMapper) -> None:
+        """Drop what waits: the model has just been refined."""
+        self._waiting.clear()
+        mapper.clear_modified_points3D()
+
+    def _refine(self, mapper: pycolmap.IncrementalMapper) -> None:
+        around = {i for new in self._waiting for i in mapper.find_local_bundle(self._mapping, new)}
+        bundle = around.union(self._waiting)
+        modified = mapper.get_modified_points3D()
+        if around:
+            short = {i for i in modified if _is_short(mapper.reconstruction.point3D(i))}
+            self._adjust(mapper, bundle, short)
+            mapper.triangulator.merge_tracks(self._triangulation, short)
+            mapper.triangulator.complete_tracks(self._triangulation, short)
+            for image_id in self._waiting:
+                mapper.triangulator.complete_image(self._triangulation, image_id)
+        limits = (self._mapping.filter_max_reproj_error, self._mapping.filter_min_tri_angle)
+        mapper.observation_manager.filter_points3D_in_images(*limits, bundle)
+        mapper.observation_manager.filter_points3D(*limits, modified)
+
+    def _adjust(
+        self, mapper: pycolmap.IncrementalMapper, bundle: set[int], points: set[int]
+    ) -> None:
+        """Cameras stay as they are where photos outside the bundle have them too."""
+        model = mapper.reconstruction
+        config = pycolmap.BundleAdjustmentConfig()
+        config.fix_gauge(pycolmap.BundleAdjustmentGauge.THREE_POINTS)
+        in_bundle: dict[int, int] = {}
+        for image_id in sorted(bundle):
+            config.add_image(image_id)
+            camera_id = model.image(image_id).camera_id
+            in_bundle[camera_id] = in_bundle.get(camera_id, 0) + 1
+        for camera_id, count in in_bundle.items():
+            if count < mapper.num_reg_images_per_camera[camera_id]:
+                config.set_constant_cam_intrinsics(camera_id)
+        for point_id in points:
+            config.add_variable_point(point_id)
+        pycolmap.create_default_bundle_adjuster(self._adjustment, config, model).solve()
+
+
+def _is_short(point: pycolmap.Point3D) -> bool:
+    return not point.has_error() or point.track.length() <= _MAX_TRACK_LENGTH
