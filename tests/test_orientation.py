@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sfm_front.orientation import common_turn, sectors
+from sfm_front.orientation import common_turn, sectors, turned_alike
 
 TOLERANCE_RAD = 0.02
 WITHIN_RAD = np.deg2rad(20)
@@ -46,6 +46,14 @@ def test_a_handful_cannot_tell():
     assert common_turn(keypoints(np.zeros(0)), keypoints(np.zeros(0))) is None
     enough = np.linspace(0, 1, 16)
     assert common_turn(keypoints(enough), keypoints(enough)) == pytest.approx(0)
+
+
+@pytest.mark.parametrize("turn", [0.0, 3.0, -2.0, 7.0])
+def test_matches_that_turn_with_the_photos_are_told_from_others(turn):
+    off = np.deg2rad([0, 29, -29, 31, -31, 180, 331, 389])
+    first = np.linspace(-3, 3, len(off))
+    alike = turned_alike(keypoints(first), keypoints(first + turn + off), turn)
+    assert alike.tolist() == [True, True, True, False, False, False, True, True]
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.4, 3.0, -2.0, 7.0])
