@@ -20,12 +20,12 @@ class Workers(Closing):
 
     While it is open, matrix products and two-view estimates run on the thread that asks for them:
     split over all cores, they would have the threads wait for each other. That limit is the
-    process's: the first to be opened sets it, the last to be closed takes it away.
+    process's: the last workers to be closed take it away.
     """
 
     _lock: ClassVar[Lock] = Lock()
-    _open: ClassVar[set[Workers]] = set()
-    _limits: ClassVar[threadpool_limits | None] = None
+    _num_open: ClassVar[int] = 0
+    _limits: ClassVar[list[threadpool_limits]] = []
 
     def __init__(self, num_threads: int) -> None:
         self.num_threads = num_threads
@@ -34,10 +34,11 @@ class Workers(Closing):
             if num_threads > 1
             else None
         )
+        self._closed = False
         with self._lock:
-            if not self._open:
-                Workers._limits = threadpool_limits(1)
-            self._open.add(self)
+            # Again for each: libraries may have been loaded since the last.
+            self._limits.append(threadpool_limits(1))
+            Workers._num_open += 1
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
         if self._pool is None:
@@ -48,7 +49,9 @@ class Workers(Closing):
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
         with self._lock:
-            self._open.discard(self)
-            if not self._open and Workers._limits is not None:
-                Workers._limits.restore_original_limits()
-                Workers._limits = None
+            if self._closed:
+                return
+            self._closed = True
+            Workers._num_open -= 1
+            while Workers._num_open == 0 and self._limits:
+                self._limits.pop().restore_original_limits()

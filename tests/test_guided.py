@@ -78,7 +78,9 @@ def test_the_geometry_is_what_colmap_would_have_estimated(orbit, views, truth, g
     )
     assert geometry.tri_angle == pytest.approx(expected.tri_angle, abs=ANGLE_TOLERANCE)
     # x2' F x1 = 0, in pixels, where there is no distortion.
-    pinhole = pycolmap.Camera.create(1, pycolmap.CameraModelId.PINHOLE, 900, 1600, 1200)
+    pinhole = pycolmap.Camera.create_from_model_id(
+        1, pycolmap.CameraModelId.PINHOLE, 900, 1600, 1200
+    )
     straight = {i: Posed(pinhole, posed.cam_from_world) for i, posed in truth.items()}
     seen = [orbit.cams_from_world[i] * orbit.points[:200] for i in (QUERY, NEAR)]
     first, second = (np.column_stack([pinhole.img_from_cam(x), np.ones(200)]) for x in seen)

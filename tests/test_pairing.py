@@ -47,19 +47,30 @@ def views(orbit) -> dict[int, View]:
 
 
 @pytest.fixture
-def recorder():
+def workers():
     with Workers(1) as workers:
-        yield Recorder(CpuMatcher(MatchingOptions(), workers))
+        yield workers
 
 
-def pairing_of(recorder: Recorder, second_look: int) -> Pairing:
-    options = RerankOptions(max_features=second_look)
-    return Pairing(recorder, Reranker(options, recorder, Verifier(), Workers(1)))
+@pytest.fixture
+def recorder(workers):
+    return Recorder(CpuMatcher(MatchingOptions(), workers))
 
 
-def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder):
+@pytest.fixture
+def pairing_of(recorder, workers):
+    """With a second look at so many features."""
+
+    def make(second_look: int) -> Pairing:
+        options = RerankOptions(max_features=second_look)
+        return Pairing(recorder, Reranker(options, recorder, Verifier(), workers))
+
+    return make
+
+
+def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder, pairing_of):
     candidates = [Candidate(1, 0.5, 100, turn_rad=0.0), Candidate(2, 0.4, 50, turn_rad=0.0)]
-    found = pairing_of(recorder, 200).match(views[0], candidates, views)
+    found = pairing_of(200).match(views[0], candidates, views)
     whole = len(views[0].features)
     assert [asked for asked in recorder.asked if asked[1]] == [(whole, 2, True)]
     assert [view.image_id for view, _ in found] == [1, 2]
@@ -68,15 +79,15 @@ def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder):
     assert len(matches & true) > 0.8 * len(true)
 
 
-def test_a_stranger_gets_a_second_look_and_no_more(views, recorder):
-    found = pairing_of(recorder, 200).match(views[0], [Candidate(6, 0.5, 5)], views)
+def test_a_stranger_gets_a_second_look_and_no_more(views, recorder, pairing_of):
+    found = pairing_of(200).match(views[0], [Candidate(6, 0.5, 5)], views)
     assert found == []
     assert [asked for asked in recorder.asked if asked[1]] == [(200, 1, False)]
 
 
-def test_the_second_look_finds_what_the_first_missed(views, recorder):
+def test_the_second_look_finds_what_the_first_missed(views, recorder, pairing_of):
     missed = [Candidate(6, 0.6, 3), Candidate(1, 0.5, 3)]
-    (found,) = pairing_of(recorder, 400).match(views[0], missed, views)
+    (found,) = pairing_of(400).match(views[0], missed, views)
     other, matches = found
     assert other.image_id == 1
     assert len(matches) > 100
@@ -84,5 +95,5 @@ def test_the_second_look_finds_what_the_first_missed(views, recorder):
     assert recorder.asked[-1] == (len(views[0].features), 1, True)
 
 
-def test_nothing_to_match_is_nothing(views, recorder):
-    assert pairing_of(recorder, 200).match(views[0], [], views) == []
+def test_nothing_to_match_is_nothing(views, pairing_of):
+    assert pairing_of(200).match(views[0], [], views) == []

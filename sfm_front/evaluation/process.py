@@ -36,7 +36,8 @@ def measure(command: Sequence[str], log: Path) -> Measured:
             stdin=subprocess.DEVNULL,
             stdout=sink,
             stderr=subprocess.STDOUT,
-            env=module_environment(),
+            # What was printed last stands last, to whichever stream it went.
+            env=module_environment() | {"PYTHONUNBUFFERED": "1"},
         )
         ended = Event()
         watcher = Thread(target=peak.watch, args=(process.pid, ended), daemon=True)
