@@ -85,6 +85,15 @@ def test_points_that_do_not_fit_are_dropped():
     assert max(point.error for point in polished.points3D.values()) < MAX_ERROR_PX
 
 
+def test_a_model_without_points_stays_as_it_is():
+    model = truth((WIDTH / 2, HEIGHT / 2))
+    for point_id in list(model.points3D):
+        model.delete_point3D(point_id)
+    polished = polish(model, PolishOptions())
+    assert principal_point(polished) == [WIDTH / 2, HEIGHT / 2]
+    assert polished.num_reg_images() == 10
+
+
 def test_wrong_matches_weigh_less_than_in_least_squares():
     exact = truth((WIDTH / 2, HEIGHT / 2))
     rng = np.random.default_rng(0)

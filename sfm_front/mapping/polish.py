@@ -115,5 +115,6 @@ def _is_better(
 
 
 def _median_error(reconstruction: pycolmap.Reconstruction) -> float:
-    """Of its points' mean reprojection errors."""
-    return float(statistics.median(point.error for point in reconstruction.points3D.values()))
+    """Of its points' mean reprojection errors; 0 where there is no point."""
+    errors = [float(point.error) for point in reconstruction.points3D.values()]
+    return statistics.median(errors) if errors else 0.0
