@@ -12,10 +12,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sfm_front.angles import FULL_TURN, wrapped
 from sfm_front.meetings import Block, Meetings
 from sfm_front.types import Float64Array, Uint32Array
 
-_FULL_TURN = 2 * np.pi
 _ROWS = 128
 # Sine of a ray's angle to the baseline, about 3 degrees. Nearer to an epipole planes are not told
 # apart, and what both photos see there has hardly any parallax.
@@ -41,8 +41,8 @@ class EpipolarPlanes:
         inf where there is no ray.
         """
         apart = self._angle2[matches[:, 1]] - self._angle1[matches[:, 0]]
-        apart = np.abs(np.mod(apart + np.pi, _FULL_TURN) - np.pi)
-        return np.nan_to_num(self._sine2[matches[:, 1]] * apart, nan=np.inf)
+        distances: Float64Array = self._sine2[matches[:, 1]] * np.abs(wrapped(apart))
+        return np.nan_to_num(distances, nan=np.inf)
 
     def meetings(self, band_rad: float) -> Meetings:
         """Each feature of the first photo meets those of the second this near to its plane."""
@@ -51,7 +51,7 @@ class EpipolarPlanes:
         # The circle is cut opposite to where the first photo looks; what lies within reach of the
         # cut is there on both sides of it.
         below, above = angle - reach < -np.pi, angle + reach > np.pi
-        angle = np.concatenate([angle, angle[below] + _FULL_TURN, angle[above] - _FULL_TURN])
+        angle = np.concatenate([angle, angle[below] + FULL_TURN, angle[above] - FULL_TURN])
         reach = np.concatenate([reach, reach[below], reach[above]])
         order2 = np.concatenate([order2, order2[below], order2[above]])
         return Meetings(order1, order2, _blocks(self._angle1[order1], angle - reach, angle + reach))

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sfm_front.angles import FULL_TURN, wrapped
 from sfm_front.meetings import Block, Meetings
 from sfm_front.types import Float32Array
 
-_FULL_TURN = 2 * np.pi
 # Of the verified matches of nine scenes, 87 to 99 % are turned within this of the pair's common
 # turn; 74 % in opensfm_lund, where facades stand aslant, and many pairs have no common turn.
 TOLERANCE_RAD = np.deg2rad(20)
@@ -30,7 +31,7 @@ def common_turn(keypoints1: Float32Array, keypoints2: Float32Array) -> float | N
     turns = np.exp(1j * (keypoints2[:, 3] - keypoints1[:, 3]))
     # Medians, not means: what does not agree must not pull.
     common = float(np.angle(complex(np.median(turns.real), np.median(turns.imag))))
-    agreeing = np.abs(np.angle(turns * np.exp(-1j * common))) < TOLERANCE_RAD
+    agreeing = _apart_rad(keypoints1, keypoints2, common) < TOLERANCE_RAD
     return common if agreeing.mean() >= _MIN_AGREEING else None
 
 
@@ -38,9 +39,18 @@ def turned_alike(
     keypoints1: Float32Array, keypoints2: Float32Array, turn_rad: float
 ) -> NDArray[np.bool_]:
     """(M,) whether matching keypoints (M, 4) turn by so much, 30 degrees more or less."""
-    apart = np.mod(keypoints2[:, 3] - keypoints1[:, 3] - turn_rad + np.pi, _FULL_TURN) - np.pi
-    alike: NDArray[np.bool_] = np.abs(apart) < _MATCH_TOLERANCE_RAD
+    alike: NDArray[np.bool_] = _apart_rad(keypoints1, keypoints2, turn_rad) < _MATCH_TOLERANCE_RAD
     return alike
+
+
+def _apart_rad(
+    keypoints1: Float32Array, keypoints2: Float32Array, turn_rad: float
+) -> NDArray[np.floating[Any]]:
+    """(M,) how far matching keypoints (M, 4) are from turning by so much."""
+    apart: NDArray[np.floating[Any]] = np.abs(
+        wrapped(keypoints2[:, 3] - keypoints1[:, 3] - turn_rad)
+    )
+    return apart
 
 
 def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: float) -> Meetings:
@@ -49,12 +59,12 @@ def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: 
     Each feature of photo 1 meets those of photo 2 within 20 degrees of where the turn takes it,
     and some up to 35 degrees away. A sixth of all pairs meets where orientations are spread.
     """
-    expected = np.mod(orientations1 + turn_rad, _FULL_TURN)
-    found = np.mod(orientations2, _FULL_TURN)
+    expected = np.mod(orientations1 + turn_rad, FULL_TURN)
+    found = np.mod(orientations2, FULL_TURN)
     order1, order2 = np.argsort(expected, kind="stable"), np.argsort(found, kind="stable")
     found = found[order2]
-    below, above = np.searchsorted(found, (TOLERANCE_RAD, _FULL_TURN - TOLERANCE_RAD))
-    circle = np.concatenate([found[above:] - _FULL_TURN, found, found[:below] + _FULL_TURN])
+    below, above = np.searchsorted(found, (TOLERANCE_RAD, FULL_TURN - TOLERANCE_RAD))
+    circle = np.concatenate([found[above:] - FULL_TURN, found, found[:below] + FULL_TURN])
     return Meetings(
         order1,
         np.concatenate([order2[above:], order2, order2[:below]]),
@@ -63,7 +73,7 @@ def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: 
 
 
 def _blocks(expected: Float32Array, found: Float32Array) -> Iterator[Block]:
-    edges = np.linspace(0, _FULL_TURN, NUM_SECTORS + 1)
+    edges = np.linspace(0, FULL_TURN, NUM_SECTORS + 1)
     rows = np.searchsorted(expected, edges)
     rows[-1] = len(expected)
     first = np.searchsorted(found, edges[:-1] - TOLERANCE_RAD)

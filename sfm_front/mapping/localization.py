@@ -38,12 +38,19 @@ class LocalizationOptions:
 
 def registered_photo(reconstruction: pycolmap.Reconstruction, image_id: int) -> Posed | None:
     """Camera and pose of a photo of a model; None where it is not in it."""
+    image = _registered_image(reconstruction, image_id)
+    if image is None:
+        return None
+    return Posed(reconstruction.camera(image.camera_id), image.cam_from_world())
+
+
+def _registered_image(
+    reconstruction: pycolmap.Reconstruction, image_id: int
+) -> pycolmap.Image | None:
     if not reconstruction.exists_image(image_id):
         return None
     image = reconstruction.image(image_id)
-    if not image.has_pose:
-        return None
-    return Posed(reconstruction.camera(image.camera_id), image.cam_from_world())
+    return image if image.has_pose else None
 
 
 def locate(
@@ -83,9 +90,9 @@ def _seen(
     """(K, 2) pixels of keypoints and (K, 3) points of the model that matches lead them to."""
     point_of: dict[int, Float64Array] = {}
     for pair in pairs:
-        if registered_photo(reconstruction, pair.image_id2) is None:
+        image = _registered_image(reconstruction, pair.image_id2)
+        if image is None:
             continue
-        image = reconstruction.image(pair.image_id2)
         for index, other in _triangulated(pair, image, options).tolist():
             point_of[index] = reconstruction.point3D(image.point2D(other).point3D_id).xyz
     xy = keypoints[list(point_of), :2].astype(np.float64)

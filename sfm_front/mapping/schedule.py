@@ -9,8 +9,6 @@ from sfm_front.errors import ConfigError
 # Photos from which a model is refined seldom, and its last adjustments go on for long. A long
 # flight unbends slowly; on small models patience only takes longer.
 LARGE = 100
-
-
 _PHOTOS_A_SHARE = 250
 
 
