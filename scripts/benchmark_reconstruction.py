@@ -14,16 +14,16 @@ from tempfile import TemporaryDirectory
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from sfm_front.config import available_cores
 from sfm_front.errors import ConfigError, InputError, SfmFrontError
-from sfm_front.evaluation.benchmark import OURS, Row, benchmark_scene
-from sfm_front.evaluation.benchmark_chart import check_matplotlib, write_chart
-from sfm_front.evaluation.benchmark_table import format_profile, format_table
-from sfm_front.evaluation.benchmark_types import CAMERA_MODES, BenchmarkSettings
 from sfm_front.evaluation.machine import machine
-from sfm_front.evaluation.rivals import RIVALS
-from sfm_front.evaluation.scenes import BenchmarkScene, find_scene
-from sfm_front.json_files import write_json
+from sfm_front.evaluation.reconstruction.benchmark import OURS, Row, benchmark_scene
+from sfm_front.evaluation.reconstruction.chart import check_matplotlib, write_chart
+from sfm_front.evaluation.reconstruction.rivals import RIVALS
+from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene, find_scene
+from sfm_front.evaluation.reconstruction.table import format_profile, format_table
+from sfm_front.evaluation.reconstruction.types import CAMERA_MODES, BenchmarkSettings
+from sfm_front.session.options import available_cores
+from sfm_front.storage.json_files import write_json
 
 RECONSTRUCT = [sys.executable, str(Path(__file__).resolve().parent / "reconstruct.py")]
 

@@ -17,19 +17,19 @@ import pycolmap
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from sfm_front.config import available_cores
 from sfm_front.errors import ConfigError, SfmFrontError
-from sfm_front.evaluation.benchmark_chart import check_matplotlib
 from sfm_front.evaluation.machine import machine
+from sfm_front.evaluation.reconstruction.chart import check_matplotlib
 from sfm_front.evaluation.retrieval.chart import write_chart
 from sfm_front.evaluation.retrieval.figures.writing import FigureWriter
 from sfm_front.evaluation.retrieval.methods import METHODS
 from sfm_front.evaluation.retrieval.run import OURS, RetrievalSettings, run
 from sfm_front.evaluation.retrieval.table import format_table, write_csv
-from sfm_front.features.cnn import NETWORKS
-from sfm_front.json_files import write_json
+from sfm_front.features.global_descriptors.cnn import NETWORKS
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
+from sfm_front.session.options import available_cores
+from sfm_front.storage.json_files import write_json
 
 
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:

@@ -18,14 +18,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from sfm_front.config import SessionOptions, available_cores
 from sfm_front.errors import ConfigError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
-from sfm_front.evaluation.stream import PhotoCost, StreamResult, run_stream
-from sfm_front.json_files import write_json
+from sfm_front.evaluation.reconstruction.stream import PhotoCost, StreamResult, run_stream
 from sfm_front.mapping.atlas import AtlasOptions
-from sfm_front.mapping.mapper import MapperOptions
+from sfm_front.mapping.model import MapperOptions
+from sfm_front.session.options import SessionOptions, available_cores
+from sfm_front.storage.json_files import write_json
 from sfm_front.types import StepReport
 
 _MIN_PHOTOS = 200

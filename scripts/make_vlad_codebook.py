@@ -13,11 +13,11 @@ import faiss
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from sfm_front.errors import SfmFrontError
-from sfm_front.features.codebook import SHIPPED_CODEBOOK
-from sfm_front.features.codebook_training import train_codebook
+from sfm_front.features.global_descriptors.codebook import SHIPPED_CODEBOOK
+from sfm_front.features.global_descriptors.codebook_training import train_codebook
 from sfm_front.features.sift import SiftExtractor
-from sfm_front.images import PhotoReader
-from sfm_front.source import list_photos
+from sfm_front.photos.reader import PhotoReader
+from sfm_front.photos.source import list_photos
 from sfm_front.types import Features, Skipped
 
 

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from sfm_front.config import available_cores
+from sfm_front.session.options import available_cores
 
 
 def machine() -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter
 
-from sfm_front.subprocesses import module_environment
+from sfm_front.runtime.subprocess_env import module_environment
 
 _POLL_SECONDS = 0.05
 

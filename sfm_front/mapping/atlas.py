@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 
+from sfm_front.geometry.posed_camera import Posed
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
-from sfm_front.mapping.mapper import MapperOptions, Model
-from sfm_front.mapping.scene import Scene
-from sfm_front.posed import Posed
-from sfm_front.stopwatch import Stopwatch
+from sfm_front.mapping.model import MapperOptions, Model
+from sfm_front.mapping.view_graph import Scene
+from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.types import Float32Array, PairGeometry
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
-from sfm_front.mapping.mapper import InitialPairDemands, MapperOptions, Model
-from sfm_front.mapping.scene import Scene
-from sfm_front.stopwatch import Stopwatch
+from sfm_front.mapping.model import InitialPairDemands, MapperOptions, Model
+from sfm_front.mapping.view_graph import Scene
+from sfm_front.runtime.stopwatch import Stopwatch
 
 _ANGLE_TOLERANCE = 0.7
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pycolmap
 
-from sfm_front.mapping.schedule import photos_together
+from sfm_front.mapping.refinement_schedule import photos_together
 
 # A point in more photos than this is left as it is: it hardly moves, and brings all of them in.
 _MAX_TRACK_LENGTH = 15

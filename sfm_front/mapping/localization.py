@@ -9,7 +9,7 @@ import numpy as np
 import pycolmap
 
 from sfm_front.errors import ConfigError
-from sfm_front.posed import Posed
+from sfm_front.geometry.posed_camera import Posed
 from sfm_front.types import Float32Array, Float64Array, PairGeometry, Uint32Array
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sfm_front.errors import ConfigError
-from sfm_front.matcher import Matcher
-from sfm_front.orientation import common_turn
+from sfm_front.matching.in_plane_rotation import common_turn
+from sfm_front.matching.matcher import Matcher
+from sfm_front.matching.verification import Verifier, View
+from sfm_front.runtime.worker_pool import Workers
 from sfm_front.types import Candidate, Uint32Array
-from sfm_front.verification import Verifier, View
-from sfm_front.workers import Workers
 
 _AT_ONCE = 12
 _GOOD_INLIERS = 30

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sfm_front.models import read_model
+from sfm_front.storage.colmap_models import read_model
+from sfm_front.viewers.model_drawing import build_scene
 from sfm_front.viewers.options import DrawOptions
-from sfm_front.viewers.scene import build_scene
 
 
 def view(model: Path, options: DrawOptions | None = None) -> None:

@@ -14,10 +14,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from sfm_front.errors import DependencyError, InputError
-from sfm_front.subprocesses import module_environment
+from sfm_front.runtime.subprocess_env import module_environment
+from sfm_front.viewers.model_drawing import Scene
 from sfm_front.viewers.open3d_loader import INSTALL_HINT
 from sfm_front.viewers.options import BACKGROUNDS, DrawOptions
-from sfm_front.viewers.scene import Scene
 from sfm_front.viewers.viewpoint import VERTICAL_FIELD_OF_VIEW_DEG
 
 #: Exit status of the drawing process when Open3D cannot load; its last line says why.

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from sfm_front.errors import DependencyError
+from sfm_front.viewers.model_drawing import Scene
 from sfm_front.viewers.open3d_loader import load_open3d
 from sfm_front.viewers.options import BACKGROUNDS, DrawOptions
-from sfm_front.viewers.scene import Scene
 from sfm_front.viewers.viewpoint import VERTICAL_FIELD_OF_VIEW_DEG, View
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from sfm_front.atomic import write_atomically
 from sfm_front.errors import InputError
-from sfm_front.images import PhotoReader
+from sfm_front.photos.reader import PhotoReader
+from sfm_front.storage.atomic import write_atomically
 from sfm_front.types import Skipped
 
 Color = tuple[int, int, int]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import random
-from pathlib import Path
 from statistics import fmean
 
 import pytest
+from helpers.locations import DATA
 
 from sfm_front.evaluation.retrieval.average_precision import assess
 from sfm_front.evaluation.retrieval.datasets.holidays import queries_of
 from sfm_front.evaluation.retrieval.datasets.oxford import read_queries
 
-FOLDER = Path(__file__).parents[3] / "shared" / "data" / "ground_truth"
+FOLDER = DATA / "ground_truth"
 EXACT = 1e-12
 
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/data")

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pycolmap
 import pytest
+from helpers.locations import DATA
 
-from sfm_front.cli import main
+from sfm_front.cli.main import main
 from sfm_front.evaluation.poses import auc, pose_errors
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 FAST = ("--max-image-size", "1000", "--max-features", "2000", "--global-descriptor", "vlad")
 
 FOUNTAIN_AUC_AT_5_DEG = 0.85

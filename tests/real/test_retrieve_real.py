@@ -6,12 +6,12 @@ import json
 from pathlib import Path
 
 import pytest
+from helpers.locations import DATA
 from PIL import Image
 
-from sfm_front.cli import main
-from sfm_front.relevance import read_relevance
+from sfm_front.cli.main import main
+from sfm_front.search.ground_truth import read_relevance
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 SCENES = ("crazyhorse", "lund_door", "sceaux_castle", "strecha_fountain_P11")
 FAST = ("--max-image-size", "800", "--max-features", "1000", "--global-descriptor", "vlad")
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
+from helpers.locations import DATA
 
-from sfm_front.evaluation.benchmark_types import BenchmarkSettings
-from sfm_front.evaluation.quality import assess
-from sfm_front.evaluation.rivals import run_rival
-from sfm_front.evaluation.scenes import find_scene
+from sfm_front.evaluation.reconstruction.quality import assess
+from sfm_front.evaluation.reconstruction.rivals import run_rival
+from sfm_front.evaluation.reconstruction.scenes import find_scene
+from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
 
-FOLDER = Path(__file__).parents[3] / "shared" / "data" / "strecha_fountain_P11"
+FOLDER = DATA / "strecha_fountain_P11"
 LEAST_AUC_AT_5_DEG = 0.85  # 0.94 was measured; a wrong frame or pairing of names gives nearly 0
 
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/data")

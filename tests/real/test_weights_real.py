@@ -9,13 +9,14 @@ from types import ModuleType
 import numpy as np
 import pytest
 import torch
+from helpers.locations import SHARED
 
 from sfm_front.errors import WeightsError
-from sfm_front.features import networks
-from sfm_front.features.cnn import NETWORKS, CnnDescriptor
-from sfm_front.features.weights import load_weights
+from sfm_front.features.global_descriptors import networks
+from sfm_front.features.global_descriptors.cnn import NETWORKS, CnnDescriptor
+from sfm_front.features.global_descriptors.weights import load_weights
 
-FOLDER = Path(__file__).parents[3] / "shared" / "weights"
+FOLDER = SHARED / "weights"
 RELATIVE_ERROR = 1e-4
 
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/weights")

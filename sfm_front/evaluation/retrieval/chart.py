@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sfm_front.evaluation.benchmark_chart import check_matplotlib, save_figure
+from sfm_front.evaluation.reconstruction.chart import check_matplotlib, save_figure
 from sfm_front.evaluation.retrieval.benchmark import Outcome
 
 _OURS_COLOR, _RIVAL_COLOR = "#d1495b", "#7d93a8"

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from sfm_front.cached_describer import CachedDescriber, Recalled
-from sfm_front.cameras import CameraCatalog
-from sfm_front.description_files import Box
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.retrieval.perceptual_hash import PerceptualHash, packed
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Query
-from sfm_front.features.global_descriptor import GlobalDescriptor
+from sfm_front.features.cached_extraction import CachedDescriber, Recalled
+from sfm_front.features.feature_cache import Box
+from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
-from sfm_front.images import PhotoReader
-from sfm_front.source import PhotoPath
+from sfm_front.matching.verification import View
+from sfm_front.photos.cameras import CameraCatalog
+from sfm_front.photos.reader import PhotoReader
+from sfm_front.photos.source import PhotoPath
 from sfm_front.types import Skipped
-from sfm_front.verification import View
 
 Progress = Callable[[int, int], None]
 """Called with the photos done and all of them."""

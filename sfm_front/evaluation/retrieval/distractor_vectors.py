@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sfm_front.features.vectors import unit_length
+from sfm_front.features.global_descriptors.unit_vectors import unit_length
 from sfm_front.types import Float32Array
 
 # A VLAD word has about as many numbers: they belong together.

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from sfm_front.errors import InputError
-from sfm_front.evaluation.benchmark_types import BenchmarkSettings
+from sfm_front.evaluation.reconstruction.rivals import run_rival
+from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
 from sfm_front.evaluation.retrieval.datasets.pool import Scene
-from sfm_front.evaluation.rivals import run_rival
-from sfm_front.models import find_models
+from sfm_front.storage.colmap_models import find_models
 
 #: The pipeline whose models are the reference: the one that misses no pair.
 PIPELINE = "exhaustive"

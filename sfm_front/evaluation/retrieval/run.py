@@ -18,11 +18,11 @@ from sfm_front.evaluation.retrieval.methods import make_method
 from sfm_front.evaluation.retrieval.methods.by_vector import ByVector
 from sfm_front.evaluation.retrieval.methods.hierarchical import Hierarchical
 from sfm_front.evaluation.retrieval.types import Method
-from sfm_front.features.global_descriptor import GlobalDescriptor, resolve
-from sfm_front.features.vlad import Vlad
+from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, resolve
+from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
-from sfm_front.workers import Workers
+from sfm_front.runtime.worker_pool import Workers
 
 OURS = Hierarchical.name
 """Our method; ``ours:VECTOR`` is the same with another global vector."""

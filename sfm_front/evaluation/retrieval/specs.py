@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from sfm_front.errors import ConfigError
-from sfm_front.evaluation.benchmark_types import BenchmarkSettings
+from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
 from sfm_front.evaluation.retrieval.datasets import pool
 from sfm_front.evaluation.retrieval.datasets.registry import PUBLISHED
 from sfm_front.evaluation.retrieval.reference_models import with_models

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sfm_front.errors import InputError
-from sfm_front.evaluation.benchmark_table import aligned
+from sfm_front.evaluation.reconstruction.table import aligned
 from sfm_front.evaluation.retrieval.average_precision import RECALL_AT
 from sfm_front.evaluation.retrieval.benchmark import Outcome
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from sfm_front.errors import InputError
-from sfm_front.source import list_photos
+from sfm_front.photos.source import list_photos
 
 _NAMED = 3
 

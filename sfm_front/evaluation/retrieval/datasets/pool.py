@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import InputError
 from sfm_front.evaluation.retrieval.types import Dataset, Query
-from sfm_front.models import find_models, read_model
-from sfm_front.source import list_photos
+from sfm_front.photos.source import list_photos
+from sfm_front.storage.colmap_models import find_models, read_model
 
 if TYPE_CHECKING:
     import pycolmap

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sfm_front.features.cnn import NETWORKS, preprocess
-from sfm_front.features.weights_cache import file_name
+from sfm_front.features.global_descriptors.cnn import NETWORKS, preprocess
+from sfm_front.features.global_descriptors.weights_download import file_name
 from sfm_front.types import Float32Array, Uint8Array
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ def first_layer(network: str, weights: Path, pixels: Uint8Array) -> FirstLayer:
     import torch
     from torch import nn
 
-    from sfm_front.features import networks
-    from sfm_front.features.weights import load_weights
+    from sfm_front.features.global_descriptors import networks
+    from sfm_front.features.global_descriptors.weights import load_weights
 
     known = NETWORKS[network]
     with torch.device("meta"):

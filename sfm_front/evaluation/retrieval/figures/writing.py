@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from sfm_front.evaluation.benchmark_chart import save_figure
+from sfm_front.evaluation.reconstruction.chart import save_figure
 from sfm_front.evaluation.retrieval.figures.first_layer import draw_first_layer, first_layer
 from sfm_front.evaluation.retrieval.figures.results import results_sheet
 from sfm_front.evaluation.retrieval.figures.vector_plane import draw_planes
 from sfm_front.evaluation.retrieval.material import Material, key_of, sampled
 from sfm_front.evaluation.retrieval.types import Dataset, Method, Query
-from sfm_front.images import PhotoReader
+from sfm_front.photos.reader import PhotoReader
 from sfm_front.types import Skipped
 from sfm_front.viewers.pictures import save
 

@@ -14,8 +14,8 @@ from sfm_front.evaluation.retrieval.methods.joined import Joined
 from sfm_front.evaluation.retrieval.methods.perceptual import ByPerceptualHash
 from sfm_front.evaluation.retrieval.methods.vocabulary_tree import VocabularyTree
 from sfm_front.evaluation.retrieval.types import Method
-from sfm_front.features.global_descriptor import NAMES
-from sfm_front.workers import Workers
+from sfm_front.features.global_descriptors.descriptor import NAMES
+from sfm_front.runtime.worker_pool import Workers
 
 NUM_TREES = 3
 """Vocabulary trees that vote together, each learnt on other descriptors."""

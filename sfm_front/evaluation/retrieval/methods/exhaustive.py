@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
-from sfm_front.matching import MatchingOptions, match
-from sfm_front.verification import Verifier, View
-from sfm_front.workers import Workers
+from sfm_front.matching.nearest_neighbors import MatchingOptions, match
+from sfm_front.matching.verification import Verifier, View
+from sfm_front.runtime.worker_pool import Workers
 
 
 class Exhaustive:

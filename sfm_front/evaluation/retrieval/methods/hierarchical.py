@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
-from sfm_front.features.vlad import Vlad
-from sfm_front.matcher import CpuMatcher
-from sfm_front.matching import MatchingOptions
+from sfm_front.features.global_descriptors.vlad import Vlad
+from sfm_front.matching.matcher import CpuMatcher
+from sfm_front.matching.nearest_neighbors import MatchingOptions
+from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
-from sfm_front.stopwatch import Stopwatch
-from sfm_front.verification import Verifier
-from sfm_front.workers import Workers
+from sfm_front.runtime.stopwatch import Stopwatch
+from sfm_front.runtime.worker_pool import Workers
 
 
 class Hierarchical:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Method, Ranked, Staged
-from sfm_front.stopwatch import Stopwatch
+from sfm_front.runtime.stopwatch import Stopwatch
 
 _DAMPING = 60
 """Ranks well below this count nearly alike; the value is the source's."""

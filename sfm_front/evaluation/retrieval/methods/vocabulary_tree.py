@@ -16,8 +16,8 @@ import pycolmap
 
 from sfm_front.evaluation.retrieval.methods.training import num_words_for, sample_descriptors
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
-from sfm_front.rigs import trivial_frame, trivial_rig
-from sfm_front.stopwatch import Stopwatch
+from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
+from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.types import Features, Float32Array
 
 DESCRIPTORS_PER_WORD = 100

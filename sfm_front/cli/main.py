@@ -1,0 +1,47 @@
+"""The command line: ``sfm-front COMMAND``; the scripts call the same."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+
+from sfm_front import __version__
+from sfm_front.cli import reconstruct, retrieve, view
+from sfm_front.errors import SfmFrontError
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; the exit status. Mistakes of the user end in one line and status 2."""
+    parser = argparse.ArgumentParser(
+        prog="sfm-front", description="Structure-from-Motion that keeps up with the camera."
+    )
+    parser.add_argument("--version", action="version", version=__version__)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add(commands, "reconstruct", "folder of photos → sparse models", reconstruct)
+    _add(commands, "retrieve", "folder and photo → its most relevant photos", retrieve)
+    _add(commands, "view", "look at a sparse model", view)
+    arguments = parser.parse_args(argv)
+    run: Callable[[argparse.Namespace], int] = arguments.run
+    # Pillow warns of damaged EXIF, line by line between the progress lines.
+    warnings.filterwarnings("ignore", module=r"PIL\.")
+    try:
+        return run(arguments)
+    except SfmFrontError as error:
+        print(f"sfm-front {arguments.command}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("\ninterrupted", file=sys.stderr)
+        return 130
+
+
+def _add(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser],
+    name: str,
+    summary: str,
+    command: object,
+) -> None:
+    parser = commands.add_parser(name, help=summary, description=command.__doc__)
+    command.add_arguments(parser)  # type: ignore[attr-defined]
+    parser.set_defaults(run=command.run)  # type: ignore[attr-defined]

@@ -1,0 +1,152 @@
+"""Reconstruct a folder of photos, one image at a time.
+
+Each photo is retrieved against those before it, its verified matches go into a COLMAP database,
+and it is placed in a model before the next one is taken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from sfm_front.cli import arguments as shared
+from sfm_front.cli.progress import ProgressLine, closing_summary
+from sfm_front.errors import ConfigError
+from sfm_front.photos.source import list_photos, order_photos
+
+if TYPE_CHECKING:
+    from sfm_front.session.options import SessionOptions
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``reconstruct``. Defaults left out here are the session's."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("folder", type=Path, help="photos, sub-folders included")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        help="where to write (default: outputs/NAME, by the folder's name, or by its parent's "
+        "if it is called images)",
+    )
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace a reconstruction that is there"
+    )
+    parser.add_argument("--text", action="store_true", help="write models as text too")
+    photos = parser.add_argument_group("photos")
+    photos.add_argument(
+        "--order", default="name", help="name, time of capture, or random (default: name)"
+    )
+    photos.add_argument("--seed", type=int, default=0, help="of --order random and of all RANSAC")
+    shared.add_photos(photos)
+    cameras = parser.add_argument_group("cameras")
+    cameras.add_argument(
+        "--camera-mode",
+        help="which photos share one: auto (default), single, per-folder or per-image",
+    )
+    cameras.add_argument("--camera-model", help="any of COLMAP's (default: SIMPLE_RADIAL)")
+    cameras.add_argument(
+        "--camera-params", metavar="F,CX,CY,…", help="known calibration, in COLMAP's order"
+    )
+    retrieval = parser.add_argument_group("retrieval")
+    shared.add_retrieval(retrieval)
+    retrieval.add_argument(
+        "--matched", type=int, metavar="N", help="best of them matched on all features (default: 8)"
+    )
+    shared.add_machine(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reconstruct; 0 if there is a model, 1 if none could be built."""
+    folder: Path = arguments.folder
+    output: Path = arguments.output or default_output(folder)
+    photos = order_photos(list_photos(folder, exclude=output), arguments.order, seed=arguments.seed)
+    options = session_options(arguments)
+
+    import pycolmap
+
+    from sfm_front.session.session import Session
+
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
+    with (
+        Session(output, options, overwrite=arguments.overwrite) as session,
+        _interruptible() as interrupted,
+    ):
+        for message in session.messages:
+            print(message)
+        progress = ProgressLine(len(photos), sys.stdout)
+        for step in session.stream(photos):
+            progress.show(step)
+            if interrupted():
+                progress.note("stopping: finishing with the photos taken so far")
+                break
+        progress.finishing()
+        models = session.finish()
+        progress.end()
+        print(closing_summary(session.report, output))
+    return 0 if models else 1
+
+
+def default_output(folder: Path) -> Path:
+    """``outputs/NAME`` below the working folder."""
+    resolved = folder.resolve()
+    named = resolved.parent if resolved.name.lower() == "images" else resolved
+    return Path("outputs") / (named.name or "photos")
+
+
+def session_options(arguments: argparse.Namespace) -> SessionOptions:
+    """What was given on the command line; the rest is the session's default."""
+    from sfm_front.mapping.atlas import AtlasOptions
+    from sfm_front.mapping.model import MapperOptions
+    from sfm_front.matching.verification import VerificationOptions
+    from sfm_front.photos.cameras import CameraOptions
+    from sfm_front.session.options import SessionOptions, available_cores
+
+    given = shared.given(arguments, "matched")
+    threads = given.setdefault("threads", available_cores())
+    cameras = {
+        "mode": arguments.camera_mode,
+        "model": arguments.camera_model,
+        "params": _numbers(arguments.camera_params),
+    }
+    return SessionOptions(
+        **given,
+        text=arguments.text,
+        cameras=CameraOptions(**{k: v for k, v in cameras.items() if v is not None}),
+        verification=VerificationOptions(seed=arguments.seed),
+        atlas=AtlasOptions(mapper=MapperOptions(num_threads=threads, seed=arguments.seed)),
+    )
+
+
+def _numbers(text: str | None) -> tuple[float, ...] | None:
+    if text is None:
+        return None
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError(
+            f"--camera-params takes numbers separated by commas, got {text!r}"
+        ) from None
+
+
+@contextmanager
+def _interruptible() -> Iterator[Callable[[], bool]]:
+    """Let the first Ctrl-C ask the loop to stop between two photos; the second one interrupts."""
+    asked = False
+
+    def ask(_number: int, _frame: FrameType | None) -> None:
+        nonlocal asked
+        if asked:
+            raise KeyboardInterrupt
+        asked = True
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield lambda: asked
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,1 @@
+"""Reconstructions measured: scenes, rivals, accuracy, cost of a photo."""

@@ -1,0 +1,65 @@
+"""A folder to benchmark on -> its photos and what is known about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sfm_front.errors import InputError
+from sfm_front.photos.source import list_photos
+from sfm_front.storage.colmap_models import find_models, is_model
+
+NamePair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchmarkScene:
+    """``truth`` is the folder of a COLMAP model with the true poses. ``pairs`` are the photos that
+    overlap, by name: where given, poses are judged on these pairs only."""
+
+    name: str
+    photos: Path
+    num_photos: int
+    truth: Path | None = None
+    pairs: tuple[NamePair, ...] | None = None
+
+
+def find_scene(folder: Path, truth: Path | None = None) -> BenchmarkScene:
+    """The scene in ``folder``: a folder of photos, or one that has them in its ``images``.
+
+    Ground truth is ``truth``, else looked for in ``gt`` beside or in the folder of photos: a model,
+    and a list of overlapping pairs in ``*pairs*.txt`` with two names a line. Raises ``InputError``
+    where there are no photos or ``truth`` is no model.
+    """
+    photos = folder / "images" if (folder / "images").is_dir() else folder
+    num_photos = len(list_photos(photos))
+    home = photos.resolve().parent if photos.resolve().name == "images" else photos.resolve()
+    if truth is not None:
+        if not is_model(truth):
+            below = find_models(truth)
+            hint = f"try {below[0]}" if below else "expected cameras, images and points3D"
+            raise InputError(f"{truth}: no COLMAP model in it; {hint}")
+        return BenchmarkScene(name=home.name, photos=photos, num_photos=num_photos, truth=truth)
+    for found in (photos.resolve().parent / "gt", photos.resolve() / "gt"):
+        lists = sorted(found.glob("*pairs*.txt"))
+        if is_model(found) or lists:
+            return BenchmarkScene(
+                name=home.name,
+                photos=photos,
+                num_photos=num_photos,
+                truth=found if is_model(found) else None,
+                pairs=_read_pairs(lists[0]) if lists else None,
+            )
+    return BenchmarkScene(name=home.name, photos=photos, num_photos=num_photos)
+
+
+def _read_pairs(file: Path) -> tuple[NamePair, ...]:
+    pairs = []
+    for number, line in enumerate(file.read_text("utf-8").splitlines(), start=1):
+        names = line.split()
+        if not names:
+            continue
+        if len(names) < 2:
+            raise InputError(f"{file}, line {number}: expected two names of photos, got {line!r}")
+        pairs.append((names[0], names[1]))
+    return tuple(pairs)

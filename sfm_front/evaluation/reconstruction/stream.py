@@ -1,0 +1,154 @@
+"""What a photo costs by its place in a long stream: a synthetic flight through a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter, process_time
+
+import numpy as np
+
+from sfm_front.errors import ConfigError
+from sfm_front.evaluation.poses import auc, pose_errors
+from sfm_front.evaluation.process import resident_bytes
+from sfm_front.evaluation.synthetic.scene import as_described, make_scene
+from sfm_front.features.global_descriptors.descriptor import resolve
+from sfm_front.session.options import SessionOptions
+from sfm_front.session.session import Session
+from sfm_front.types import Float64Array, StepReport
+
+_DESCRIPTOR = "vlad"
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoCost:
+    """What one photo cost from retrieval to mapping: wall seconds without global refinement and
+    with it, and the processor's seconds, refinement included, which other work on the machine
+    hardly changes. ``memory_bytes``: the process's after it; None where the system does not tell.
+    """
+
+    seconds: float
+    seconds_with_refinement: float
+    processor_seconds: float
+    memory_bytes: int | None
+    num_registered: int
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """How many times more late photos cost than early ones, by the figures of ``PhotoCost`` and,
+    as ``amortized_seconds``, with each refinement spread over the photos since the one before."""
+
+    seconds: float
+    seconds_with_refinement: float
+    amortized_seconds: float
+    processor_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class StreamResult:
+    """``finish_seconds``: the end of the session, export included. ``auc``: of all pairs' poses,
+    at 1, 3 and 5 degrees, from 0 to 1."""
+
+    photos: tuple[PhotoCost, ...]
+    finish_seconds: float
+    num_registered: int
+    auc: tuple[float, ...]
+
+    def growth(self, early: slice, late: slice) -> Growth:
+        """Means of the late photos over means of the early ones, each figure by itself."""
+        figures = {
+            name: np.array([getattr(photo, name) for photo in self.photos])
+            for name in ("seconds", "seconds_with_refinement", "processor_seconds")
+        }
+        figures["amortized_seconds"] = self.amortized_seconds()
+        return Growth(
+            **{
+                name: float(values[late].mean() / values[early].mean())
+                for name, values in figures.items()
+            }
+        )
+
+    def amortized_seconds(self) -> Float64Array:
+        """(N,) wall seconds, each refinement spread over the photos since the one before.
+
+        Refinements come in lumps, further and further apart: which hundred photos one falls into
+        is chance. After the last one its share goes on.
+        """
+        seconds = np.array([photo.seconds for photo in self.photos])
+        refinement = np.array([photo.seconds_with_refinement for photo in self.photos]) - seconds
+        spread = np.zeros(len(seconds))
+        start = 0
+        for end in (np.flatnonzero(refinement > 0) + 1).tolist():
+            spread[start:] = refinement[end - 1] / (end - start)
+            start = end
+        amortized: Float64Array = seconds + spread
+        return amortized
+
+    def exponent(self, start: int) -> float:
+        """The power of its number that a photo's cost follows, fitted from ``start`` on.
+
+        0 is constant, 1 linear. Of the processor's seconds. Refinements come in lumps: what is
+        fitted is the sum up to each photo, whose power is one more.
+        """
+        total = np.cumsum([photo.processor_seconds for photo in self.photos])
+        numbers = np.arange(1, len(total) + 1)
+        slope, _ = np.polyfit(np.log(numbers[start:]), np.log(total[start:]), 1)
+        return float(slope) - 1
+
+    def memory_per_photo(self, start: int) -> float | None:
+        """Bytes that each photo from ``start`` on added: the slope of a straight line."""
+        memory = [photo.memory_bytes for photo in self.photos[start:]]
+        known = np.array([value for value in memory if value is not None], np.float64)
+        if len(known) < len(memory) or len(known) < 2:
+            return None
+        slope, _ = np.polyfit(np.arange(len(known)), known, 1)
+        return float(slope)
+
+
+def run_stream(
+    num_photos: int,
+    points_per_image: int,
+    output: Path,
+    options: SessionOptions,
+    *,
+    seed: int,
+    note: Callable[[StepReport], None],
+) -> StreamResult:
+    """Fly in strips over hills and reconstruct from given features; nothing is read or detected.
+
+    ``note`` hears of each photo. Raises ConfigError for fewer than two photos.
+    """
+    if num_photos < 2:
+        raise ConfigError(f"a stream has two photos at least, got {num_photos}")
+    scene = make_scene(num_photos, points_per_image, seed=seed, layout="strip")
+    descriptor, _ = resolve(_DESCRIPTOR)
+    costs: list[PhotoCost] = []
+    with Session(output, options) as session:
+        for index in range(num_photos):
+            seen = scene.photo(index)
+            vector = descriptor.describe(np.empty(0, np.uint8), seen.features)
+            photo = as_described(seen, scene.camera, vector)
+            started, processor_started = perf_counter(), process_time()
+            step = session.take(photo)
+            seconds = perf_counter() - started
+            costs.append(
+                PhotoCost(
+                    seconds - step.seconds.get("refine", 0.0),
+                    seconds,
+                    process_time() - processor_started,
+                    resident_bytes(),
+                    step.num_registered,
+                )
+            )
+            note(step)
+        started = perf_counter()
+        models = [summary.reconstruction for summary in session.finish()]
+        finish_seconds = perf_counter() - started
+    return StreamResult(
+        photos=tuple(costs),
+        finish_seconds=finish_seconds,
+        num_registered=max((int(model.num_reg_images()) for model in models), default=0),
+        auc=tuple(auc(pose_errors(scene.truth(), models))),
+    )

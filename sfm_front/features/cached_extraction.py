@@ -1,0 +1,155 @@
+"""Photos → features and global vectors, several photos at a time and none of it done twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from sfm_front.features.feature_cache import (
+    Box,
+    ContentKeys,
+    DescriptionFiles,
+    DescriptionSettings,
+    LocalDescription,
+)
+from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
+from sfm_front.features.sift import SiftExtractor
+from sfm_front.photos.reader import PhotoReader, file_digest
+from sfm_front.photos.source import PhotoPath
+from sfm_front.runtime.prefetch import map_ahead
+from sfm_front.types import DescribedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recalled:
+    """A described photo, and its vectors by the names of the descriptors.
+
+    ``photo.global_vector`` is that of the first descriptor.
+    """
+
+    photo: DescribedPhoto
+    vectors: Mapping[str, Float32Array]
+
+
+class CachedDescriber:
+    """Describes photos; what is already in its folder is read from there. Threads may share it."""
+
+    def __init__(
+        self,
+        folder: Path,
+        reader: PhotoReader,
+        sift: SiftExtractor,
+        descriptors: Mapping[str, GlobalDescriptor],
+    ) -> None:
+        self.files = DescriptionFiles(folder)
+        self._reader = reader
+        self._sift = sift
+        self._descriptors = dict(descriptors)
+        self.settings = DescriptionSettings(
+            reader.max_image_size,
+            reader.min_image_size,
+            sift.max_features,
+            tuple(descriptor.fingerprint for descriptor in self._descriptors.values()),
+        )
+
+    def describe(
+        self, photo: PhotoPath, box: Box | None = None, *, digest: str | None = None
+    ) -> Recalled | Skipped:
+        """Describe a photo, or the part of it in ``box``; keypoints are those of the whole file.
+
+        ``digest``: that of the file, where it is known already. Raises InputError where
+        the folder cannot be written to.
+        """
+        known = digest or file_digest(photo.path, photo.name)
+        if isinstance(known, Skipped):
+            return known
+        digest = known
+        keys = self.settings.keys(digest, box)
+        local = self.files.load_local(keys.features)
+        vectors = self.files.load_vectors(keys)
+        if local is None or vectors is None:
+            made = self._make(photo, box, keys)
+            if isinstance(made, Skipped):
+                return made
+            local, vectors = made
+        described = DescribedPhoto(
+            name=photo.name,
+            path=photo.path,
+            width=local.width,
+            height=local.height,
+            digest=digest,
+            exif=local.exif,
+            features=local.features,
+            global_vector=vectors[0] if vectors else np.zeros(0, np.float32),
+        )
+        return Recalled(described, dict(zip(self._descriptors, vectors, strict=True)))
+
+    def stream(
+        self,
+        photos: Iterable[PhotoPath],
+        boxes: Mapping[str, Box] | None = None,
+        *,
+        num_threads: int,
+    ) -> Iterator[Recalled | Skipped]:
+        """Describe photos in order, ``num_threads`` of them at a time; ``boxes`` by name."""
+
+        def describe(photo: PhotoPath) -> Recalled | Skipped:
+            return self.describe(photo, None if boxes is None else boxes.get(photo.name))
+
+        return map_ahead(describe, photos, num_threads=num_threads)
+
+    def _make(
+        self, photo: PhotoPath, box: Box | None, keys: ContentKeys
+    ) -> tuple[LocalDescription, list[Float32Array]] | Skipped:
+        """Describe a photo, except for what is stored of it, and store the rest."""
+        read = self._reader.read(photo.path, photo.name)
+        if isinstance(read, Skipped):
+            return read
+        part, offset = (read, (0.0, 0.0)) if box is None else crop(read, box)
+        local = self.files.load_local(keys.features)
+        if local is None:
+            features = _moved(self._sift.extract(part), offset)
+            if len(features) == 0:
+                return Skipped(photo.name, SkipReason.NO_FEATURES, "no texture to hold on to")
+            local = LocalDescription(read.width, read.height, read.exif, features)
+            self.files.save_local(keys.features, local)
+        vectors = []
+        for key, descriptor in zip(keys.vectors, self._descriptors.values(), strict=True):
+            vector = self.files.load_vector(key)
+            if vector is None:
+                vector = descriptor.describe(part.pixels, local.features)
+                self.files.save_vector(key, vector)
+            vectors.append(vector)
+        return local, vectors
+
+
+def crop(photo: Photo, box: Box) -> tuple[Photo, tuple[float, float]]:
+    """The part of a photo in ``box`` as a photo of its own, and its left and top in the file.
+
+    At least one working pixel is left; ``width`` and ``height`` become the part's in the file.
+    """
+    height, width = photo.pixels.shape[:2]
+    per_column, per_row = photo.width / width, photo.height / height
+    left, right = _inside(box[0] / per_column, box[2] / per_column, width)
+    top, bottom = _inside(box[1] / per_row, box[3] / per_row, height)
+    part = replace(
+        photo,
+        pixels=np.ascontiguousarray(photo.pixels[top:bottom, left:right]),
+        width=round((right - left) * per_column),
+        height=round((bottom - top) * per_row),
+    )
+    return part, (left * per_column, top * per_row)
+
+
+def _inside(start: float, end: float, size: int) -> tuple[int, int]:
+    first = min(max(round(start), 0), size - 1)
+    return first, min(max(round(end), first + 1), size)
+
+
+def _moved(features: Features, offset: tuple[float, float]) -> Features:
+    keypoints = features.keypoints.copy()
+    keypoints[:, :2] += np.asarray(offset, np.float32)
+    return replace(features, keypoints=keypoints)

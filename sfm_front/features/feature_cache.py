@@ -1,0 +1,184 @@
+"""What photos were described by, on disk: features and global vectors by what they depend on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from sfm_front.storage.array_files import ArrayFiles, Arrays
+from sfm_front.types import Exif, Features, Float32Array, GeoPosition
+
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom in pixels of the file."""
+
+_FORMAT = 1
+_DECISIVE_CODE = (
+    "photos/decoding.py",
+    "features/sift.py",
+    "features/global_descriptors/vlad.py",
+    "features/global_descriptors/visual_words.py",
+    "features/global_descriptors/unit_vectors.py",
+    "features/global_descriptors/cnn.py",
+    "features/global_descriptors/networks.py",
+    "features/global_descriptors/descriptor.py",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalDescription:
+    """Size of a photo's file, what its camera wrote, and its SIFT features."""
+
+    width: int
+    height: int
+    exif: Exif
+    features: Features
+
+
+@dataclass(frozen=True, slots=True)
+class ContentKeys:
+    """Where a photo's description is kept: its features, and a vector for each descriptor."""
+
+    features: str
+    vectors: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptionSettings:
+    """All that decides what features and vectors a photo has, apart from its bytes.
+
+    ``fingerprints`` are those of the global descriptors.
+    """
+
+    max_image_size: int
+    min_image_size: int
+    max_features: int
+    fingerprints: tuple[str, ...]
+
+    def keys(self, digest: str, box: Box | None = None) -> ContentKeys:
+        """Keys of the photo whose bytes have ``digest``, or of the part in ``box``."""
+        # Another release of OpenCV may find other keypoints.
+        local = (
+            _FORMAT,
+            _code_digest(),
+            cv2.__version__,
+            self.max_image_size,
+            self.min_image_size,
+            self.max_features,
+            digest,
+            box,
+        )
+        return ContentKeys(
+            _key(local), tuple(_key((*local, fingerprint)) for fingerprint in self.fingerprints)
+        )
+
+
+class DescriptionFiles:
+    """A folder of descriptions that several sessions, settings and descriptors may share."""
+
+    def __init__(self, folder: Path) -> None:
+        self._features = ArrayFiles(folder / "features")
+        self._vectors = ArrayFiles(folder / "vectors")
+
+    def has(self, keys: ContentKeys) -> bool:
+        """Whether there are files for features and every vector; they may be damaged."""
+        return self._features.has(keys.features) and all(map(self._vectors.has, keys.vectors))
+
+    def load_local(self, key: str) -> LocalDescription | None:
+        """None where there is none, or the file is damaged."""
+        arrays = self._features.load(key)
+        try:
+            return None if arrays is None else _unpacked(arrays)
+        except (KeyError, ValueError, TypeError):
+            return None
+
+    def save_local(self, key: str, local: LocalDescription) -> None:
+        features = local.features
+        about = {"width": local.width, "height": local.height, "exif": asdict(local.exif)}
+        self._features.save(
+            key,
+            {
+                "keypoints": features.keypoints,
+                "descriptors": features.descriptors,
+                "colors": features.colors,
+                "about": np.frombuffer(json.dumps(about, default=_to_json).encode(), np.uint8),
+            },
+        )
+
+    def load_vector(self, key: str) -> Float32Array | None:
+        """None where there is none, or the file is damaged."""
+        arrays = self._vectors.load(key)
+        vector = None if arrays is None else arrays.get("vector")
+        return None if vector is None or vector.dtype != np.float32 else vector
+
+    def load_vectors(self, keys: ContentKeys) -> list[Float32Array] | None:
+        """Every vector of a photo; None where any of them is not there whole."""
+        vectors = [self.load_vector(key) for key in keys.vectors]
+        there = [vector for vector in vectors if vector is not None]
+        return there if len(there) == len(vectors) else None
+
+    def save_vector(self, key: str, vector: Float32Array) -> None:
+        self._vectors.save(key, {"vector": vector})
+
+    def keep_only(self, kept: Iterable[ContentKeys]) -> None:
+        """Remove every other description."""
+        kept = list(kept)
+        self._features.keep_only({keys.features for keys in kept})
+        self._vectors.keep_only({key for keys in kept for key in keys.vectors})
+
+
+@lru_cache
+def _code_digest() -> str:
+    """Of the code that decides what features and vectors are: a number to be raised with each
+    change of it would be forgotten, and photos described by different code do not match."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name in _DECISIVE_CODE:
+        digest.update(files("sfm_front").joinpath(name).read_bytes())
+    return digest.hexdigest()
+
+
+def _key(parts: tuple[Any, ...]) -> str:
+    return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
+
+
+def _to_json(value: object) -> str:
+    if isinstance(value, datetime):
+        return value.isoformat()
+    raise TypeError(f"{type(value).__name__} is nothing that EXIF holds")
+
+
+def _unpacked(arrays: Arrays) -> LocalDescription:
+    about = json.loads(arrays["about"].tobytes())
+    exif = about["exif"]
+    if exif["captured_at"] is not None:
+        exif["captured_at"] = datetime.fromisoformat(exif["captured_at"])
+    if exif["position"] is not None:
+        exif["position"] = GeoPosition(**exif["position"])
+    keypoints, descriptors, colors = (
+        _checked(arrays[name], dtype, columns)
+        for name, dtype, columns in (
+            ("keypoints", np.float32, 4),
+            ("descriptors", np.uint8, 128),
+            ("colors", np.uint8, 3),
+        )
+    )
+    if not len(keypoints) == len(descriptors) == len(colors):
+        raise ValueError("keypoints, descriptors and colors differ in number")
+    features = Features(keypoints, descriptors, colors)
+    return LocalDescription(about["width"], about["height"], Exif(**exif), features)
+
+
+def _checked(array: NDArray[Any], dtype: type, columns: int) -> NDArray[Any]:
+    if array.dtype != dtype or array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{array.shape} {array.dtype}")
+    return array

@@ -1,0 +1,1 @@
+"""Global vectors: networks, VLAD, and both side by side."""

@@ -1,0 +1,1 @@
+"""Angles, poses and rigs."""

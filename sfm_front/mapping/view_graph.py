@@ -1,0 +1,128 @@
+"""Everything seen so far, in the form pycolmap's mapper reads: the only streaming calls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable
+
+import pycolmap
+
+from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
+from sfm_front.types import Float32Array, PairGeometry
+
+
+class Scene:
+    """The photos and verified pairs that every model is grown over.
+
+    A photo's image, frame and (for its camera) rig ids are equal to the image and camera ids it
+    is added with. The correspondence graph is never finalised: pycolmap cannot append to a
+    finalised one, and answers queries on an open one.
+    """
+
+    def __init__(self) -> None:
+        self._cache = pycolmap.DatabaseCache()
+        self._neighbors: dict[int, dict[int, int]] = {}
+        self._angles_rad: dict[tuple[int, int], float] = {}
+
+    def add(
+        self,
+        image_id: int,
+        name: str,
+        camera: pycolmap.Camera,
+        keypoints: Float32Array,
+        pairs: Iterable[PairGeometry],
+    ) -> None:
+        """Add a photo with keypoints (N, 4) and all its verified pairs with earlier photos."""
+        cache = self._cache
+        if not cache.exists_camera(camera.camera_id):
+            cache.add_camera(camera)
+            cache.add_rig(trivial_rig(camera))
+        image = pycolmap.Image(
+            name=name,
+            keypoints=keypoints[:, :2].astype("float64"),
+            camera_id=camera.camera_id,
+            image_id=image_id,
+        )
+        image.frame_id = image_id
+        cache.add_frame(trivial_frame(image))
+        cache.add_image(image)
+        self._neighbors[image_id] = {}
+        for pair in pairs:
+            cache.correspondence_graph.add_two_view_geometry(
+                pair.image_id1, pair.image_id2, pair.two_view_geometry
+            )
+            self._neighbors[pair.image_id1][pair.image_id2] = pair.num_inliers
+            self._neighbors[pair.image_id2][pair.image_id1] = pair.num_inliers
+            self._angles_rad[pair.image_id1, pair.image_id2] = pair.two_view_geometry.tri_angle
+
+    def __len__(self) -> int:
+        return len(self._neighbors)
+
+    @property
+    def image_ids(self) -> list[int]:
+        """In order of arrival."""
+        return list(self._neighbors)
+
+    def neighbors(self, image_id: int) -> dict[int, int]:
+        """Photos with a verified pair with this one → inliers of the pair."""
+        return self._neighbors[image_id]
+
+    def pairs(self, among: Collection[int]) -> list[tuple[int, int]]:
+        """Verified pairs of these photos, most inliers first; the later photo stands first."""
+        members = set(among)
+        found = [
+            (-inliers, i, j)
+            for i in members
+            for j, inliers in self._neighbors[i].items()
+            if j in members and (i, j) in self._angles_rad
+        ]
+        return [(i, j) for _, i, j in sorted(found)]
+
+    def angle_deg(self, pair: tuple[int, int]) -> float | None:
+        """Median triangulation angle of a verified pair, by its own two-view geometry.
+
+        None where that geometry has no relative pose, as without a focal length.
+        """
+        angle_rad = self._angles_rad[pair]
+        return math.degrees(angle_rad) if angle_rad >= 0 else None
+
+    def component(self, start: Iterable[int], *, among: Collection[int] | None = None) -> set[int]:
+        """Photos linked to the given ones by chains of verified pairs, these included.
+
+        ``among`` limits the chains to these photos.
+        """
+        found = set(start)
+        frontier = list(found)
+        while frontier:
+            for neighbor in self._neighbors[frontier.pop()]:
+                if neighbor not in found and (among is None or neighbor in among):
+                    found.add(neighbor)
+                    frontier.append(neighbor)
+        return found
+
+    def new_mapper(self) -> tuple[pycolmap.IncrementalMapper, pycolmap.Reconstruction]:
+        """A mapper with an empty model over all photos so far. Call once there is a photo."""
+        reconstruction = pycolmap.Reconstruction()
+        reconstruction.load(self._cache)
+        mapper = pycolmap.IncrementalMapper(self._cache)
+        mapper.begin_reconstruction(reconstruction)
+        return mapper, reconstruction
+
+    def extend(
+        self,
+        mapper: pycolmap.IncrementalMapper,
+        reconstruction: pycolmap.Reconstruction,
+        image_id: int,
+    ) -> None:
+        """Let a model know of a photo that was added after its mapper was made.
+
+        ``Reconstruction.load`` would do the same, but walks all photos each time.
+        """
+        cache = self._cache
+        image = cache.image(image_id)
+        if not reconstruction.exists_camera(image.camera_id):
+            reconstruction.add_camera(cache.camera(image.camera_id))
+            reconstruction.add_rig(cache.rig(image.camera_id))
+        reconstruction.add_frame(cache.frame(image.frame_id))
+        reconstruction.add_image(image)
+        mapper.observation_manager.add_image(image_id)

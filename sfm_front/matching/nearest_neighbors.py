@@ -1,0 +1,113 @@
+"""Descriptors × descriptors → tentative matches: nearest neighbours, ratio test, mutual check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sfm_front.errors import ConfigError
+from sfm_front.matching.in_plane_rotation import sectors
+from sfm_front.matching.match_mask import Block, Meetings
+from sfm_front.types import Features, Float32Array, Uint8Array, Uint32Array
+
+SQUARED_NORM = 512.0**2
+# Rows of similarities that stay in the cache between the passes over them.
+_BLOCK = 256
+NO_MATCHES: Uint32Array = np.zeros((0, 2), np.uint32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatchingOptions:
+    """COLMAP's tests on the angle between descriptors, the ratio one in one direction only.
+
+    ``max_ratio``: the nearest neighbour's angle over the second nearest's.
+    ``max_angle_rad``: the largest angle of a match.
+    """
+
+    max_ratio: float = 0.8
+    max_angle_rad: float = 0.7
+
+    def __post_init__(self) -> None:
+        if not 0 < self.max_ratio <= 1:
+            raise ConfigError(f"max_ratio must be above 0 and at most 1, got {self.max_ratio}")
+        if self.max_angle_rad <= 0:
+            raise ConfigError(f"max_angle_rad must be above 0, got {self.max_angle_rad}")
+
+
+def match(
+    descriptors1: Uint8Array, descriptors2: Uint8Array, options: MatchingOptions
+) -> Uint32Array:
+    """RootSIFT (N, 128) and (M, 128) uint8 → mutual nearest neighbours (K, 2) uint32.
+
+    A row holds the index in the first and in the second; rows rise in the first column, and no
+    index comes twice. Exact: the similarities are whole numbers that float32 holds. One matrix
+    product serves both directions; taking rows by the block keeps the search for the best two in
+    the cache, where faiss' two searches took 1.2 (4000 × 4000) to 2.6 times (800 × 800) as long.
+    """
+    count1, count2 = len(descriptors1), len(descriptors2)
+    blocks = [
+        Block(slice(start, min(start + _BLOCK, count1)), slice(0, count2))
+        for start in range(0, count1, _BLOCK)
+    ]
+    everything = Meetings(np.arange(count1), np.arange(count2), blocks)
+    return match_meeting(descriptors1, descriptors2, everything, options)
+
+
+def match_turned(
+    features1: Features, features2: Features, turn_rad: float, options: MatchingOptions
+) -> Uint32Array:
+    """Like ``match``, but only features whose orientations agree with the photos' turn meet.
+
+    On 12 pairs of each of nine scenes it took 0.22 to 0.46 of the time and gave 1.02 to 1.16 times
+    the inliers: a feature's second nearest is not sought where no match can be.
+    """
+    alike = sectors(features1.keypoints[:, 3], features2.keypoints[:, 3], turn_rad)
+    return match_meeting(features1.descriptors, features2.descriptors, alike, options)
+
+
+def match_meeting(
+    descriptors1: Uint8Array, descriptors2: Uint8Array, meetings: Meetings, options: MatchingOptions
+) -> Uint32Array:
+    """Like ``match``, but only features that meet are compared."""
+    first = descriptors1[meetings.order1].astype(np.float32)
+    second = descriptors2[meetings.order2].astype(np.float32)
+    index2 = meetings.order2
+    count = len(first)
+    nearest = np.zeros(count, np.intp)
+    best = np.full(count, -1, np.float32)
+    runner_up = np.full(count, -1, np.float32)
+    best_of_second = np.zeros(index2.max(initial=-1) + 1, np.float32)
+    for rows, columns, meet in meetings.blocks:
+        index = index2[columns]
+        if rows.stop == rows.start or len(index) < 2:
+            continue
+        similarity = first[rows] @ second[columns].T
+        if meet is not None:
+            similarity *= meet
+        best_of_second[index] = np.maximum(best_of_second[index], similarity.max(axis=0))
+        row = np.arange(len(similarity))
+        of_row = similarity.argmax(axis=1)
+        nearest[rows] = index[of_row]
+        best[rows] = similarity[row, of_row]
+        similarity[row, of_row] = -1
+        runner_up[rows] = similarity.max(axis=1)
+    if count == 0 or len(best_of_second) == 0:
+        return NO_MATCHES
+    angle = _angle(best)
+    kept = np.flatnonzero(
+        (angle <= options.max_angle_rad)
+        & (angle < options.max_ratio * _angle(runner_up))
+        & (best == best_of_second[nearest])
+    )
+    # Equal descriptors in the first photo share their nearest neighbour: the first one has it.
+    found = meetings.order1[kept]
+    order = np.argsort(found)
+    targets, once = np.unique(nearest[kept][order], return_index=True)
+    matches = np.stack([found[order][once], targets], axis=1).astype(np.uint32)
+    return matches[np.argsort(matches[:, 0])]
+
+
+def _angle(similarity: Float32Array) -> Float32Array:
+    angle: Float32Array = np.arccos(np.minimum(similarity / SQUARED_NORM, 1.0))
+    return angle

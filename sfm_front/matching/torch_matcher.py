@@ -1,0 +1,119 @@
+"""Matching of a photo with all its candidates in one batch, by torch: for GPUs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sfm_front.matching.in_plane_rotation import NUM_SECTORS, TOLERANCE_RAD
+from sfm_front.matching.nearest_neighbors import NO_MATCHES, SQUARED_NORM, MatchingOptions
+from sfm_front.types import Features, Uint32Array
+
+if TYPE_CHECKING:
+    import torch
+
+# Similarities held at once: 2 GiB of float32.
+_MAX_SIMILARITIES = 2**29
+_SECTOR_RAD = 2 * math.pi / NUM_SECTORS
+
+
+class TorchMatcher:
+    """Finds what ``matching.match`` and ``matching.match_turned`` find.
+
+    Similarities are whole numbers below 2^24, which float32 products give exactly; torch leaves
+    TensorFloat-32, which would not, off for matrix products unless told otherwise.
+    """
+
+    def __init__(self, options: MatchingOptions, device: str) -> None:
+        self._options = options
+        self._device = device
+
+    def match(
+        self,
+        query: Features,
+        others: Sequence[Features],
+        turns_rad: Sequence[float | None],
+    ) -> list[Uint32Array]:
+        """See ``matcher.Matcher``."""
+        if len(query) < 2:
+            return [NO_MATCHES] * len(others)
+        longest = max((len(other) for other in others), default=1)
+        at_once = max(1, _MAX_SIMILARITIES // (len(query) * max(longest, 1)))
+        found: list[Uint32Array] = []
+        for start in range(0, len(others), at_once):
+            chosen = slice(start, start + at_once)
+            found += self._match_batch(query, others[chosen], turns_rad[chosen])
+        return found
+
+    def _match_batch(
+        self, query: Features, others: Sequence[Features], turns_rad: Sequence[float | None]
+    ) -> list[Uint32Array]:
+        import torch
+
+        with torch.inference_mode():
+            similarity = self._similarities(query, others, turns_rad)
+            two, nearest_two = similarity.topk(2, dim=2)
+            best, runner_up = two.unbind(dim=2)
+            nearest = nearest_two[:, :, 0]
+            best_of_second = similarity.amax(dim=1)
+            angle, next_angle = _angle(best), _angle(runner_up)
+            kept = (
+                (angle <= self._options.max_angle_rad)
+                & (angle < self._options.max_ratio * next_angle)
+                & (best == best_of_second.gather(1, nearest))
+            )
+            return [
+                _first_of_each(kept_of_pair.cpu().numpy(), nearest_of_pair.cpu().numpy())
+                for kept_of_pair, nearest_of_pair in zip(kept, nearest, strict=True)
+            ]
+
+    def _similarities(
+        self, query: Features, others: Sequence[Features], turns_rad: Sequence[float | None]
+    ) -> torch.Tensor:
+        """(pairs, N, M) float32; -1 where two features do not meet, or there is none."""
+        import torch
+
+        width = max(2, *(len(other) for other in others))
+        descriptors = torch.zeros((len(others), width, 128), device=self._device)
+        exists = torch.zeros((len(others), 1, width), dtype=torch.bool, device=self._device)
+        for pair, other in enumerate(others):
+            descriptors[pair, : len(other)] = self._send(other.descriptors).float()
+            exists[pair, 0, : len(other)] = True
+        similarity = self._send(query.descriptors).float() @ descriptors.transpose(1, 2)
+        similarity.masked_fill_(~exists, -1)
+        for pair, turn_rad in enumerate(turns_rad):
+            if turn_rad is not None and len(others[pair]) > 0:
+                meets = self._meets(query, others[pair], turn_rad)
+                similarity[pair, :, : len(others[pair])].masked_fill_(~meets, -1)
+        return similarity
+
+    def _meets(self, query: Features, other: Features, turn_rad: float) -> torch.Tensor:
+        """(N, M) bool: as ``orientation.sectors`` has it."""
+        import torch
+
+        expected = torch.remainder(self._send(query.keypoints[:, 3]) + turn_rad, 2 * math.pi)
+        middle = (torch.floor(expected / _SECTOR_RAD) + 0.5) * _SECTOR_RAD
+        apart = middle[:, None] - self._send(other.keypoints[:, 3])[None]
+        apart = torch.remainder(apart + math.pi, 2 * math.pi) - math.pi
+        meets: torch.Tensor = apart.abs() <= _SECTOR_RAD / 2 + TOLERANCE_RAD
+        return meets
+
+    def _send(self, array: np.ndarray) -> torch.Tensor:
+        import torch
+
+        return torch.from_numpy(np.ascontiguousarray(array)).to(self._device)
+
+
+def _angle(similarity: torch.Tensor) -> torch.Tensor:
+    return (similarity / SQUARED_NORM).clamp(max=1).arccos()
+
+
+def _first_of_each(kept: np.ndarray, nearest: np.ndarray) -> Uint32Array:
+    """Rows (query, other) of what is kept; of equals in the query, the first one."""
+    rows = np.flatnonzero(kept)
+    _, once = np.unique(nearest[rows], return_index=True)
+    rows = rows[np.sort(once)]
+    return np.stack([rows, nearest[rows]], axis=1).astype(np.uint32)

@@ -1,0 +1,1 @@
+"""From a folder to decoded photos and their cameras."""

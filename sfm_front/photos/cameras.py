@@ -1,0 +1,212 @@
+"""Photos -> the COLMAP cameras that they share, with a focal length to start from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
+
+from sfm_front.errors import ConfigError
+from sfm_front.photos.exif import FULL_FRAME_DIAGONAL_MM
+from sfm_front.types import DescribedPhoto, Photo
+
+if TYPE_CHECKING:
+    import pycolmap
+
+CameraMode = Literal["auto", "single", "per-folder", "per-image"]
+AnyPhoto: TypeAlias = "Photo | DescribedPhoto"
+
+DEFAULT_FOCAL_FACTOR = 1.2
+"""Focal length over the long side where nothing is known, as in COLMAP."""
+
+PLAUSIBLE_FOCAL_FACTORS = (0.1, 10.0)
+"""An EXIF focal length outside this many long sides is taken for a mistake."""
+
+PHOTOS_PER_SIZE = 10
+"""Photos without EXIF share cameras while their folder has at most one size, and one more for
+this many photos. Folders of film frames, of a phone or of a benchmark have one size. Photos from
+the internet have nearly as many sizes as photos (the 74 of the Image Matching Challenge's
+Reichstag have 68): where two agree, it is by chance."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraOptions:
+    """How photos are given cameras.
+
+    ``mode``: which photos share one camera.
+      ``auto``: those of the same make, model, focal length and size; those without EXIF by folder
+      and size (see ``PHOTOS_PER_SIZE``).
+      ``single``: all. ``per-folder``: those of a folder. ``per-image``: none.
+      Whatever the mode, photos of different size have different cameras: COLMAP would refuse them
+      in the modes ``single`` and ``per-folder``; here no photo is lost. A photo turned on its side
+      is one of different size.
+    ``model``: a COLMAP camera model.
+    ``params``: known calibration, in COLMAP's order and in pixels of the file. It holds for the
+    first photo and those of its size; other photos have their own focal length to start from.
+    """
+
+    mode: CameraMode = "auto"
+    model: str = "SIMPLE_RADIAL"
+    params: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        import pycolmap
+
+        if self.mode not in get_args(CameraMode):
+            modes = ", ".join(get_args(CameraMode))
+            raise ConfigError(f"camera mode must be one of {modes}, got {self.mode}")
+        models = [name for name in pycolmap.CameraModelId.__members__ if name != "INVALID"]
+        if self.model not in models:
+            raise ConfigError(f"camera model must be one of {', '.join(models)}, got {self.model}")
+        if self.params is None:
+            return
+        expected = pycolmap.Camera.create_from_model_name(1, self.model, 1.0, 1, 1)
+        if len(self.params) != len(expected.params):
+            raise ConfigError(
+                f"camera params of {self.model} are {len(expected.params)} numbers "
+                f"({expected.params_info}), got {len(self.params)}"
+            )
+        if not all(math.isfinite(value) for value in self.params):
+            raise ConfigError(f"camera params must be finite numbers, got {self.params}")
+        if any(self.params[i] <= 0 for i in expected.focal_length_idxs()):
+            raise ConfigError(
+                f"camera params of {self.model} ({expected.params_info}): "
+                f"focal lengths must be above 0, got {self.params}"
+            )
+
+
+class CameraChoice(NamedTuple):
+    """The camera of a photo; ``is_new`` if no earlier photo has it."""
+
+    camera_id: int
+    camera: pycolmap.Camera
+    is_new: bool
+
+
+@dataclass(slots=True)
+class _Folder:
+    """Photos without EXIF in one folder: how many so far, and their sizes, turned or not."""
+
+    num_photos: int = 0
+    sizes: set[tuple[int, int]] = field(default_factory=set)
+
+
+class CameraCatalog:
+    """Hands out cameras to photos that arrive one at a time.
+
+    What an earlier photo was given is never changed: mapping already uses it. A resumed session
+    calls ``remember`` for its photos in their order, and goes on as if it had never stopped.
+    """
+
+    def __init__(self, options: CameraOptions | None = None) -> None:
+        self._options = options or CameraOptions()
+        self._cameras: dict[Hashable, pycolmap.Camera] = {}
+        self._folders: dict[str, _Folder] = {}
+        self._calibrated_size: tuple[int, int] | None = None
+        self._last_id = 0
+
+    def camera_for(self, photo: AnyPhoto) -> CameraChoice:
+        """The camera of a photo that has just arrived. The object is shared with earlier photos.
+
+        Raises ConfigError if a given calibration cannot be that of the first photo.
+        """
+        key = self._arrive(photo)
+        known = self._cameras.get(key)
+        if known is not None:
+            return CameraChoice(known.camera_id, known, is_new=False)
+        camera = self._new_camera(photo)
+        self._keep(key, camera)
+        return CameraChoice(camera.camera_id, camera, is_new=True)
+
+    def remember(self, photo: AnyPhoto, camera: pycolmap.Camera) -> None:
+        """Restore what an earlier session chose for a photo; photos come in their order."""
+        self._keep(self._arrive(photo), camera)
+
+    def _keep(self, key: Hashable, camera: pycolmap.Camera) -> None:
+        self._cameras.setdefault(key, camera)
+        self._last_id = max(self._last_id, camera.camera_id)
+
+    def _arrive(self, photo: AnyPhoto) -> Hashable:
+        """Count a photo in; equal keys share a camera."""
+        size = photo.width, photo.height
+        folder = str(PurePosixPath(photo.name).parent)
+        if self._calibrated_size is None:
+            self._calibrated_size = size
+        match self._options.mode:
+            case "per-image":
+                return ("photo", photo.name)
+            case "single":
+                return ("all", size)
+            case "per-folder":
+                return ("folder", folder, size)
+        exif = photo.exif
+        identity = (exif.make, exif.model, exif.focal_length_mm, exif.focal_length_35mm)
+        if any(identity):
+            return ("camera", identity, size)
+        seen = self._folders.setdefault(folder, _Folder())
+        seen.num_photos += 1
+        seen.sizes.add((min(size), max(size)))
+        if len(seen.sizes) <= 1 + seen.num_photos // PHOTOS_PER_SIZE:
+            return ("folder", folder, size)
+        return ("photo", photo.name)
+
+    def _new_camera(self, photo: AnyPhoto) -> pycolmap.Camera:
+        import pycolmap
+
+        prior = focal_prior_px(photo)
+        camera = pycolmap.Camera.create_from_model_name(
+            self._last_id + 1,
+            self._options.model,
+            prior or DEFAULT_FOCAL_FACTOR * max(photo.width, photo.height),
+            photo.width,
+            photo.height,
+        )
+        camera.has_prior_focal_length = prior is not None
+        params = self._options.params
+        if params is not None and (photo.width, photo.height) == self._calibrated_size:
+            _check_principal_point(camera, params, photo)
+            camera.params = list(params)
+            camera.has_prior_focal_length = True
+        return camera
+
+
+def focal_prior_px(photo: AnyPhoto) -> float | None:
+    """The focal length in pixels that EXIF gives, or None where it gives none or an absurd one.
+
+    From the 35 mm equivalent as in COLMAP (by diagonals); else from the focal length and the
+    sensor width of make and model in COLMAP's camera database, for which pycolmap reads the file.
+    """
+    exif = photo.exif
+    focal_px: float | None = None
+    if exif.focal_length_35mm is not None:
+        diagonal_px = math.hypot(photo.width, photo.height)
+        focal_px = exif.focal_length_35mm / FULL_FRAME_DIAGONAL_MM * diagonal_px
+    elif exif.focal_length_mm is not None and exif.make and exif.model:
+        focal_px = _focal_from_camera_database(photo)
+    smallest, largest = PLAUSIBLE_FOCAL_FACTORS
+    if focal_px is None or not smallest <= focal_px / max(photo.width, photo.height) <= largest:
+        return None
+    return focal_px
+
+
+def _focal_from_camera_database(photo: AnyPhoto) -> float | None:
+    import pycolmap
+
+    try:
+        camera = pycolmap.infer_camera_from_image(photo.path)
+    except ValueError:  # A format that pycolmap cannot read, such as WebP.
+        return None
+    return float(camera.mean_focal_length()) if camera.has_prior_focal_length else None
+
+
+def _check_principal_point(
+    camera: pycolmap.Camera, params: tuple[float, ...], photo: AnyPhoto
+) -> None:
+    point = [params[i] for i in camera.principal_point_idxs()]
+    if not all(0 < at < side for at, side in zip(point, (photo.width, photo.height), strict=False)):
+        raise ConfigError(
+            f"camera params put the principal point at {tuple(point)}, outside of {photo.name} "
+            f"({photo.width} x {photo.height}). Give them in pixels of the files."
+        )

@@ -1,0 +1,99 @@
+"""A photo's file -> Photo, or the reason why it is not used."""
+
+from __future__ import annotations
+
+import hashlib
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from sfm_front.errors import ConfigError
+from sfm_front.photos.decoding import Undecodable, decode
+from sfm_front.types import Photo, Skipped, SkipReason
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhotoReader:
+    """Reads photos: JPEG, PNG, TIFF, BMP and WebP with any kind of pixels.
+
+    ``max_image_size``: the long side of a photo's pixels is reduced to this, never enlarged.
+    ``min_image_size``: files whose short side is below this are skipped. Both in pixels.
+    It keeps nothing between photos and may be used from several threads.
+    """
+
+    max_image_size: int = 1600
+    min_image_size: int = 64
+
+    def __post_init__(self) -> None:
+        if self.min_image_size < 1:
+            raise ConfigError(f"min_image_size must be at least 1, got {self.min_image_size}")
+        if self.max_image_size < self.min_image_size:
+            raise ConfigError(
+                f"max_image_size must be at least min_image_size ({self.min_image_size}), "
+                f"got {self.max_image_size}"
+            )
+
+    def read(self, path: Path, name: str) -> Photo | Skipped:
+        """Read the photo at ``path``, to be known as ``name``. No file makes this raise."""
+        data = _content(path, name)
+        if isinstance(data, Skipped):
+            return data
+        decoded = decode(data, self.max_image_size)
+        if isinstance(decoded, Undecodable):
+            return Skipped(name, decoded.reason, decoded.detail)
+        if min(decoded.width, decoded.height) < self.min_image_size:
+            return Skipped(
+                name,
+                SkipReason.TOO_SMALL,
+                f"{decoded.width} x {decoded.height} pixels, "
+                f"the short side must have {self.min_image_size}",
+            )
+        return Photo(
+            name=name,
+            path=path,
+            pixels=decoded.pixels,
+            width=decoded.width,
+            height=decoded.height,
+            digest=_digest(data),
+            exif=decoded.exif,
+        )
+
+
+def file_digest(path: Path, name: str) -> str | Skipped:
+    """The digest that a ``Photo`` of this file has, decodable or not. No file makes this raise."""
+    data = _content(path, name)
+    return data if isinstance(data, Skipped) else _digest(data)
+
+
+class DuplicateFinder:
+    """Tells photos that are byte for byte the same as an earlier one.
+
+    ``known`` maps the digests of a session that is resumed to the photos' names. Ask in the order
+    in which photos arrive, from one thread: the first of several copies is the one that is kept.
+    """
+
+    def __init__(self, known: Mapping[str, str] | None = None) -> None:
+        self._name_by_digest = dict(known or {})
+
+    def check(self, name: str, digest: str) -> Skipped | None:
+        """Skipped if an earlier photo of another name has this digest; None remembers this one."""
+        first = self._name_by_digest.setdefault(digest, name)
+        if first == name:
+            return None
+        return Skipped(name, SkipReason.DUPLICATE, f"same file as {first}")
+
+
+def _content(path: Path, name: str) -> bytes | Skipped:
+    try:
+        # Opening a pipe would wait for ever, so anything that is no file is refused first.
+        if not stat.S_ISREG(path.stat().st_mode):
+            return Skipped(name, SkipReason.UNREADABLE, "not a regular file")
+        return path.read_bytes()
+    except (OSError, ValueError, MemoryError) as error:
+        detail = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        return Skipped(name, SkipReason.UNREADABLE, detail)
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.blake2b(data, digest_size=16).hexdigest()

@@ -1,0 +1,103 @@
+"""A folder -> the photos in it, in the order in which they are to arrive."""
+
+from __future__ import annotations
+
+import logging
+import os
+import random
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Literal, get_args
+
+from sfm_front.errors import ConfigError, InputError
+from sfm_front.photos.exif import read_exif
+from sfm_front.photos.formats import EXTENSIONS
+
+logger = logging.getLogger(__name__)
+
+PhotoOrder = Literal["name", "time", "random"]
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoPath:
+    """A photo's file, and its name: the path below the photo folder with forward slashes."""
+
+    name: str
+    path: Path
+
+
+def list_photos(folder: Path, *, exclude: Path | None = None) -> list[PhotoPath]:
+    """Every photo below ``folder``, sub-folders and links to folders included, sorted by name as
+    text (``img10`` before ``img2``), as COLMAP sorts them.
+
+    A file is taken for a photo by its extension alone, so that one whose content is no image can
+    be reported; other files, and hidden files and folders, are passed over. Nothing below
+    ``exclude`` is listed: an output folder may lie among the photos. Raises InputError where there
+    is no such folder or no photo in it.
+    """
+    if not folder.exists():
+        raise InputError(f"{folder}: no such folder. Give the folder that holds the photos.")
+    if not folder.is_dir():
+        raise InputError(f"{folder}: not a folder. Give the folder that holds the photos.")
+    photos = [PhotoPath(_name_below(folder, path), path) for path in _walk(folder, exclude)]
+    if not photos:
+        raise InputError(
+            f"{folder}: no photo in it or its sub-folders. "
+            f"Photos end in {', '.join(EXTENSIONS)}, in upper or lower case."
+        )
+    return sorted(photos, key=lambda photo: photo.name)
+
+
+def order_photos(
+    photos: Iterable[PhotoPath], order: PhotoOrder = "name", *, seed: int = 0
+) -> list[PhotoPath]:
+    """Photos by ``name``; by ``time`` of capture, then name, those without a time last; or in a
+    ``random`` order that ``seed`` alone decides."""
+    if order not in get_args(PhotoOrder):
+        raise ConfigError(f"order must be one of {', '.join(get_args(PhotoOrder))}, got {order}")
+    by_name = sorted(photos, key=lambda photo: photo.name)
+    if order == "random":
+        random.Random(seed).shuffle(by_name)
+    elif order == "time":
+        by_name.sort(key=_capture_time)
+    return by_name
+
+
+def _capture_time(photo: PhotoPath) -> datetime:
+    return read_exif(photo.path).captured_at or datetime.max
+
+
+def _walk(folder: Path, exclude: Path | None) -> Iterator[Path]:
+    """Paths of the photos below ``folder``; each folder once, even where links make a loop."""
+    seen = {_identity(folder)}
+    if exclude is not None and exclude.exists():
+        seen.add(_identity(exclude))
+
+    def warn(error: OSError) -> None:
+        logger.warning("%s: cannot be listed: %s", error.filename, error.strerror)
+
+    for root, folders, files in os.walk(folder, onerror=warn, followlinks=True):
+        here = Path(root)
+        kept = []
+        for name in sorted(folders):
+            identity = _identity(here / name)
+            if not name.startswith(".") and identity not in seen:
+                seen.add(identity)
+                kept.append(name)
+        folders[:] = kept
+        for name in files:
+            if not name.startswith(".") and name.lower().endswith(EXTENSIONS):
+                yield here / name
+
+
+def _identity(folder: Path) -> tuple[int, int]:
+    status = folder.stat()
+    return status.st_dev, status.st_ino
+
+
+def _name_below(folder: Path, path: Path) -> str:
+    """The name in valid UTF-8, as databases and JSON need it: stray bytes become ``\\xe4``."""
+    raw = os.fsencode(path.relative_to(folder).as_posix())
+    return raw.decode("utf-8", errors="backslashreplace")

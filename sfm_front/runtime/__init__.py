@@ -1,0 +1,1 @@
+"""Threads, devices and clocks; knows nothing of photos."""

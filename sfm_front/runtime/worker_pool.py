@@ -1,0 +1,57 @@
+"""A few threads that do the same thing to several items."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from threading import Lock
+from typing import ClassVar, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from sfm_front.runtime.closeable import Closing
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class Workers(Closing):
+    """Maps a function over items on ``num_threads`` threads; results come in the items' order.
+
+    While it is open, matrix products and two-view estimates run on the thread that asks for them:
+    split over all cores, they would have the threads wait for each other. That limit is the
+    process's: the last workers to be closed take it away.
+    """
+
+    _lock: ClassVar[Lock] = Lock()
+    _num_open: ClassVar[int] = 0
+    _limits: ClassVar[list[threadpool_limits]] = []
+
+    def __init__(self, num_threads: int) -> None:
+        self.num_threads = num_threads
+        self._pool = (
+            ThreadPoolExecutor(num_threads, "sfm-pairs", threadpool_limits, (1, "openmp"))
+            if num_threads > 1
+            else None
+        )
+        self._closed = False
+        with self._lock:
+            # Again for each: libraries may have been loaded since the last.
+            self._limits.append(threadpool_limits(1))
+            Workers._num_open += 1
+
+    def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+        if self._pool is None:
+            return [function(item) for item in items]
+        return list(self._pool.map(function, items))
+
+    def close(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+            Workers._num_open -= 1
+            while Workers._num_open == 0 and self._limits:
+                self._limits.pop().restore_original_limits()

@@ -1,0 +1,1 @@
+"""One photo's path from file to model."""

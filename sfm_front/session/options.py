@@ -1,0 +1,68 @@
+"""All options of a session in one place; each part is checked when it is built."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sfm_front.errors import ConfigError
+from sfm_front.features.sift import SiftExtractor
+from sfm_front.mapping.atlas import AtlasOptions
+from sfm_front.matching.guided_matching import GuidedOptions
+from sfm_front.matching.nearest_neighbors import MatchingOptions
+from sfm_front.matching.verification import VerificationOptions
+from sfm_front.photos.cameras import CameraOptions
+from sfm_front.photos.reader import PhotoReader
+from sfm_front.retrieval.rerank import RerankOptions
+from sfm_front.retrieval.retriever import RetrievalOptions
+
+
+def available_cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionOptions:
+    """How photos are described, retrieved, matched and mapped.
+
+    ``max_image_size``: long side in pixels that photos are reduced to. ``max_features``: SIFT
+    keypoints a photo. ``global_descriptor``: a name that ``features.global_descriptor.resolve``
+    knows; ``weights``: a file for its network; ``device``: ``auto``, ``cpu`` or
+    ``cuda``, of the network and of matching. ``rerank``: the look that ranks candidates;
+    ``second_look``: at those of which it told too little.
+    ``matched``: re-ranked photos that are matched on all features; ``unguided``: so many of them,
+    the best, come first, and where they tell the pose it guides the others. ``threads``: cores to
+    use.
+    ``text``: write models in COLMAP's text form too.
+    """
+
+    max_image_size: int = 1600
+    max_features: int = 4000
+    global_descriptor: str = "auto"
+    weights: Path | None = None
+    device: str = "auto"
+    matched: int = 8
+    unguided: int = 3
+    text: bool = False
+    threads: int = field(default_factory=available_cores)
+    cameras: CameraOptions = field(default_factory=CameraOptions)
+    retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
+    rerank: RerankOptions = field(default_factory=RerankOptions)
+    second_look: RerankOptions = field(default_factory=lambda: RerankOptions(max_features=2000))
+    matching: MatchingOptions = field(default_factory=MatchingOptions)
+    guided: GuidedOptions = field(default_factory=GuidedOptions)
+    verification: VerificationOptions = field(default_factory=VerificationOptions)
+    atlas: AtlasOptions = field(default_factory=AtlasOptions)
+
+    def __post_init__(self) -> None:
+        if self.matched < 1:
+            raise ConfigError(f"matched must be at least 1, got {self.matched}")
+        if self.unguided < 1:
+            raise ConfigError(f"unguided must be at least 1, got {self.unguided}")
+        if self.threads < 1:
+            raise ConfigError(f"threads must be at least 1, got {self.threads}")
+        # These check themselves: here, so that it is done before a session has written anything.
+        PhotoReader(max_image_size=self.max_image_size)
+        SiftExtractor(self.max_features)

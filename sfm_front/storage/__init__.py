@@ -1,0 +1,1 @@
+"""Files and databases: written whole or not at all."""

@@ -1,0 +1,210 @@
+"""The command line: help, exit status, and one line for every mistake."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from helpers.locations import ROOT
+from PIL import Image
+
+from sfm_front.cli import reconstruct
+from sfm_front.cli.main import main
+from sfm_front.session.options import SessionOptions
+
+HEAVY = ("torch", "pycolmap", "cv2", "open3d", "faiss")
+
+
+def run_in_process_of_its_own(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--help"],
+        *([name, "--help"] for name in ("reconstruct", "retrieve", "view")),
+        ["--version"],
+    ],
+)
+def test_help_loads_nothing_heavy(arguments):
+    code = (
+        "import sys\n"
+        "from sfm_front.cli.main import main\n"
+        f"try: main({arguments})\n"
+        "except SystemExit as stop: assert not stop.code\n"
+        f"print('loaded', [name for name in {HEAVY} if name in sys.modules])"
+    )
+    done = run_in_process_of_its_own("-c", code)
+    assert done.stderr == ""
+    assert done.stdout.splitlines()[-1] == "loaded []"
+
+
+def test_the_script_is_the_command():
+    done = run_in_process_of_its_own("scripts/reconstruct.py", "--help")
+    assert done.returncode == 0
+    assert "--max-image-size" in done.stdout
+
+
+def parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser()
+    reconstruct.add_arguments(made)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("argument", "default"),
+    [
+        ("--max-image-size", SessionOptions().max_image_size),
+        ("--max-features", SessionOptions().max_features),
+        ("--camera-mode", SessionOptions().cameras.mode),
+        ("--camera-model", SessionOptions().cameras.model),
+        ("--global-descriptor", SessionOptions().global_descriptor),
+        ("--candidates", SessionOptions().retrieval.candidates),
+        ("--matched", SessionOptions().matched),
+    ],
+)
+def test_help_tells_the_defaults_of_a_session(argument, default):
+    (told,) = (action.help for action in parser()._actions if argument in action.option_strings)
+    values = re.findall(r"\(default: ([^)]*)\)|(\S+) \(default\)", told)
+    assert [first or second for first, second in values] == [str(default)]
+
+
+def test_the_seed_is_the_sessions_where_none_is_given():
+    assert parser().parse_args(["folder"]).seed == SessionOptions().verification.seed
+
+
+def test_what_is_not_given_is_the_sessions_default():
+    arguments = parser().parse_args(["folder"])
+    assert reconstruct.session_options(arguments) == SessionOptions(
+        atlas=reconstruct.session_options(arguments).atlas
+    )
+
+
+@pytest.fixture
+def photo(tmp_path: Path) -> Path:
+    """A folder with one photo; a good one is not needed where the options are wrong."""
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    Image.new("RGB", (200, 150), (10, 20, 30)).save(folder / "a.png")
+    return folder
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line on stderr of a command that ends with status 2."""
+    assert main([str(argument) for argument in arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
+    assert err.endswith("\n")
+    return line
+
+
+def test_a_folder_that_is_missing(tmp_path, capsys):
+    line = refused(capsys, "reconstruct", tmp_path / "none", "--output", tmp_path / "out")
+    assert line.startswith(f"sfm-front reconstruct: {tmp_path / 'none'}: no such folder")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_without_photos(tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / "notes.txt").write_text("no photo")
+    line = refused(capsys, "reconstruct", tmp_path / "empty", "--output", tmp_path / "out")
+    assert "no photo in it or its sub-folders" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_in_place_of_a_folder(photo, tmp_path, capsys):
+    line = refused(capsys, "reconstruct", photo / "a.png", "--output", tmp_path / "out")
+    assert "a.png: not a folder" in line
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--camera-params", "1000,500"], "camera params of SIMPLE_RADIAL are 4 numbers"),
+        (["--camera-params", "1000,a,b,0"], "--camera-params takes numbers"),
+        (["--camera-params=-5,100,75,0"], "focal lengths must be above 0"),
+        (["--camera-params", "100,nan,75,0"], "camera params must be finite numbers"),
+        (["--camera-model", "PINHOLE", "--camera-params", "9,9,9"], "camera params of PINHOLE"),
+        (["--camera-model", "BOX"], "camera model must be one of"),
+        (["--camera-mode", "one"], "camera mode must be one of auto, single"),
+        (["--order", "size"], "order must be one of name, time, random, got size"),
+        (["--max-features", "0"], "max_features must be at least 1, got 0"),
+        (["--max-image-size", "10"], "max_image_size must be at least"),
+        (["--candidates", "0"], "candidates must be at least 1, got 0"),
+        (["--matched", "0"], "matched must be at least 1, got 0"),
+        (["--threads", "0"], "threads must be at least 1, got 0"),
+        (["--global-descriptor", "bag"], "no global descriptor is called 'bag'"),
+        (["--global-descriptor", "vlad", "--weights", "none.pth"], "--weights goes with one"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_options_that_cannot_be(photo, tmp_path, capsys, given, message):
+    line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out", *given)
+    assert message in line
+    assert line.startswith("sfm-front reconstruct: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_weights_that_are_not_there(photo, tmp_path, capsys):
+    line = refused(
+        capsys,
+        *("reconstruct", photo, "--output", tmp_path / "out"),
+        *("--global-descriptor", "mobilenet_v2", "--weights", tmp_path / "none.pth"),
+    )
+    assert "none.pth" in line
+
+
+def test_an_output_that_holds_a_reconstruction(photo, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "database.db").write_bytes(b"kept")
+    line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out")
+    assert "holds a reconstruction already" in line
+    assert (tmp_path / "out" / "database.db").read_bytes() == b"kept"
+
+
+def test_an_output_that_is_a_file(photo, tmp_path, capsys):
+    (tmp_path / "out").write_bytes(b"kept")
+    line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out", "--overwrite")
+    assert "not a folder" in line
+    assert (tmp_path / "out").read_bytes() == b"kept"
+
+
+def test_a_wrong_option_does_not_cost_the_reconstruction_that_is_there(photo, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "database.db").write_bytes(b"kept")
+    refused(
+        capsys,
+        *("reconstruct", photo, "--output", tmp_path / "out", "--overwrite"),
+        *("--max-features", "0"),
+    )
+    assert (tmp_path / "out" / "database.db").read_bytes() == b"kept"
+
+
+def test_a_model_to_view_that_is_missing(tmp_path, capsys):
+    line = refused(capsys, "view", tmp_path / "none")
+    assert line.startswith(f"sfm-front view: {tmp_path / 'none'}: no such folder")
+
+
+@pytest.mark.parametrize("arguments", [[], ["rebuild"], ["reconstruct"], ["reconstruct", "a", "b"]])
+def test_what_is_no_command_is_status_2(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    assert "usage: sfm-front" in capsys.readouterr().err
+
+
+def test_ctrl_c_is_no_traceback(monkeypatch, capsys):
+    def interrupted(_arguments: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(reconstruct, "run", interrupted)
+    assert main(["reconstruct", "folder"]) == 130
+    assert capsys.readouterr().err == "\ninterrupted\n"

@@ -1,0 +1,192 @@
+"""What the user reads: the live line, plain lines, and the closing summary."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+
+from sfm_front.cli import progress
+from sfm_front.cli.progress import CountLine, ProgressLine, closing_summary
+from sfm_front.types import Skipped, SkipReason, StepReport
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def turn(monkeypatch):
+    """A clock that the test turns."""
+    now = [50.0]
+    monkeypatch.setattr(progress.time, "perf_counter", lambda: now[0])
+
+    def later(seconds: float) -> None:
+        now[0] += seconds
+
+    return later
+
+
+def placed(name: str, registered: int, points: int) -> StepReport:
+    return StepReport(name, image_id=1, num_registered=registered, num_points=points)
+
+
+def test_without_a_terminal_there_is_a_line_a_photo(turn):
+    stream = io.StringIO()
+    line = ProgressLine(4, stream)
+    turn(2.0)
+    line.show(placed("a.jpg", 0, 0))
+    turn(4.0)
+    line.show(placed("b.jpg", 2, 150))
+    assert stream.getvalue().splitlines() == [
+        "photo 1/4  registered 0  points 0  2.00 s a photo  0:06 left",
+        "photo 2/4  registered 2  points 150  3.00 s a photo  0:06 left",
+    ]
+
+
+def test_a_skipped_photo_is_named_with_its_reason_and_counts(turn):
+    stream = io.StringIO()
+    line = ProgressLine(3, stream)
+    line.show(placed("a.jpg", 5, 70))
+    turn(1.0)
+    skipped = Skipped("süd/b.jpg", SkipReason.DUPLICATE, "same file as a.jpg")
+    line.show(StepReport("süd/b.jpg", skipped=skipped))
+    lines = stream.getvalue().splitlines()
+    assert lines[1] == "skipped süd/b.jpg: duplicate: same file as a.jpg"
+    # The skipped photo takes nothing away from what is registered.
+    assert lines[2].startswith("photo 2/3  registered 5  points 70")
+
+
+def test_on_a_terminal_one_line_renews_itself(turn, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    stream = Terminal()
+    line = ProgressLine(200, stream)
+    for number in range(3):
+        turn(1.0)
+        line.show(placed(f"{number}.jpg", number, 1_000_000))
+    assert "\n" not in stream.getvalue()
+    shown = stream.getvalue().split("\r\x1b[K")[1:]
+    assert [text.split("  ")[0] for text in shown] == ["photo 1/200", "photo 2/200", "photo 3/200"]
+    assert all(len(text) < 40 for text in shown)
+
+
+def test_a_note_on_a_terminal_stays():
+    stream = Terminal()
+    line = ProgressLine(2, stream)
+    line.show(placed("a.jpg", 0, 0))
+    line.note("stopping")
+    line.end()
+    assert stream.getvalue().endswith("\r\x1b[Kstopping\n\r\x1b[K")
+
+
+def test_long_runs_are_told_in_hours(turn):
+    stream = io.StringIO()
+    line = ProgressLine(3601, stream)
+    turn(2.0)
+    line.show(placed("a.jpg", 0, 0))
+    assert stream.getvalue().endswith("2:00:00 left\n")
+
+
+def row(name: str, **changes: object) -> dict[str, object]:
+    plain = {"name": name, "skipped": None, "registered": True, "why_not_registered": None}
+    return plain | changes
+
+
+def content(photos: list[dict[str, object]], models: int = 1) -> dict[str, object]:
+    registered = sum(bool(photo["registered"]) for photo in photos)
+    return {
+        "photos": photos,
+        "models": [
+            {
+                "path": f"sparse/{number}",
+                "registered": registered,
+                "points3D": 1234,
+                "mean_reprojection_error_px": 0.4321,
+            }
+            for number in range(models)
+        ],
+        "totals": {
+            "photos": len(photos),
+            "registered": registered,
+            "models": models,
+            "wall_seconds": 65.0,
+            "seconds_by_stage": {"sift": 4.0, "map": 2.0},
+            "median_seconds_by_quarter": [1.0, 2.0, 2.5, 2.25],
+        },
+    }
+
+
+def test_the_summary_says_what_became_of_all():
+    photos = [
+        row("a.jpg"),
+        row("b.jpg"),
+        row("c.jpg", registered=False, why_not_registered="no verified matches"),
+        row("d.jpg", registered=False, skipped={"reason": "empty file", "detail": ""}),
+        row("e.jpg", registered=False, skipped={"reason": "too small", "detail": "20 x 20"}),
+    ]
+    assert closing_summary(content(photos), Path("out")).splitlines() == [
+        "2 of 5 photos registered in 1 model, 1:05",
+        f"  {Path('out/sparse/0')}: 2 photos, 1234 points, 0.43 px",
+        "seconds a photo: 13.00 in all; by stage, side by side in part: sift 0.800, map 0.400",
+        "work on a photo, global refinement apart, median by quarter of the run: "
+        "1.00 s, 2.00 s, 2.50 s, 2.25 s",
+        "skipped:",
+        "  d.jpg: empty file",
+        "  e.jpg: too small: 20 x 20",
+        "not registered:",
+        "  c.jpg: no verified matches",
+    ]
+
+
+def test_many_reasons_are_counted():
+    photos = [
+        row(f"{n}.jpg", registered=False, why_not_registered="far off" if n % 3 else "blurred")
+        for n in range(30)
+    ]
+    lines = closing_summary(content(photos), Path("out")).splitlines()
+    assert lines[-3:] == [
+        "not registered: 30 photos (each in report.json)",
+        "  20 × far off",
+        "  10 × blurred",
+    ]
+
+
+def test_without_a_model_it_says_what_to_do():
+    photos = [row("a.jpg", registered=False, why_not_registered="no verified matches")]
+    summary = closing_summary(content(photos, models=0), Path("out"))
+    assert summary.startswith("0 of 1 photos registered in 0 models")
+    assert "no model could be built" in summary.splitlines()[-1]
+
+
+def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):
+    stream = io.StringIO()
+    line = CountLine("indexing photo", 40, stream)
+    for _ in range(40):
+        turn(0.5)
+        line.count()
+    line.end()
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 10
+    assert lines[0] == "indexing photo 4/40  0.50 s a photo  0:18 left"
+    assert lines[-1].startswith("indexing photo 40/40")
+
+
+def test_counting_on_a_terminal_renews_one_line_and_leaves_none():
+    terminal = Terminal()
+    line = CountLine("indexing photo", 3, terminal)
+    for _ in range(3):
+        line.count()
+    line.end()
+    assert "\n" not in terminal.getvalue()
+    assert "indexing photo 2/3" in terminal.getvalue()
+    assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+def test_counting_a_few_photos_without_a_terminal_names_each():
+    stream = io.StringIO()
+    line = CountLine("photo", 3, stream)
+    for _ in range(3):
+        line.count()
+    assert [text.split()[1] for text in stream.getvalue().splitlines()] == ["1/3", "2/3", "3/3"]

@@ -1,0 +1,251 @@
+"""The main job on the rendered village: bad files, odd names, interruption, repeatability."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shutil
+import signal
+import sqlite3
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+import pytest
+from helpers.locations import VILLAGE
+from helpers.model_building import make_model
+from PIL import Image
+
+from sfm_front.cli.main import main
+from sfm_front.cli.progress import ProgressLine
+from sfm_front.cli.reconstruct import default_output
+from sfm_front.evaluation.poses import auc, pose_errors
+from sfm_front.photos.source import list_photos, order_photos
+
+SUB_FOLDER = "süd flug ✈"
+# Less than is had at full size: what the tests need is a fair run that is quick.
+SMALL = ("--max-image-size", "640", "--max-features", "1500")
+FAST = (*SMALL, "--candidates", "12", "--global-descriptor", "vlad")
+AUC_AT_5_DEG = 0.85
+
+BAD = {
+    "empty.png": "empty file",
+    "flat.png": "no features",
+    "gone.jpg": "unreadable",
+    "half.jpg": "truncated",
+    "text.jpg": "not an image",
+    "tiny.png": "too small",
+    "x copy.jpg": "duplicate",
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    status: int
+    output: Path
+    stdout: str
+    report: dict
+    names: list[str]
+
+
+def tables(database: Path) -> dict[str, list[tuple[object, ...]]]:
+    """The content of a database, table by table."""
+    with sqlite3.connect(database) as connection:
+        names = [
+            name
+            for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type='table'")
+        ]
+        return {name: connection.execute(f'SELECT * FROM "{name}"').fetchall() for name in names}
+
+
+def reconstruct(folder: Path, output: Path, *more: str) -> int:
+    return main(["reconstruct", str(folder), "--output", str(output), *FAST, *more])
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Run:
+    """The whole village in a sub-folder of odd name, and one bad file of each kind beside it."""
+    folder = tmp_path_factory.mktemp("photos")
+    names = []
+    for photo in sorted((VILLAGE / "images").iterdir()):
+        names.append(f"{SUB_FOLDER}/Bild {photo.name}")
+        target = folder / names[-1]
+        target.parent.mkdir(exist_ok=True)
+        shutil.copy(photo, target)
+    first = folder / names[0]
+    (folder / "empty.png").touch()
+    Image.new("RGB", (300, 200), (90, 90, 120)).save(folder / "flat.png")
+    (folder / "gone.jpg").symlink_to(folder / "moved away.jpg")
+    (folder / "half.jpg").write_bytes(first.read_bytes()[:20_000])
+    (folder / "text.jpg").write_text("this is no image")
+    Image.new("RGB", (20, 16)).save(folder / "tiny.png")
+    shutil.copy(first, folder / "x copy.jpg")
+    output = tmp_path_factory.mktemp("output") / "out"
+    stdout = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stdout", stdout)
+        status = reconstruct(folder, output)
+    report = json.loads((output / "report.json").read_text(encoding="utf-8"))
+    return Run(status, output, stdout.getvalue(), report, names)
+
+
+def test_bad_files_do_not_stop_it(run):
+    assert run.status == 0
+    assert run.report["totals"]["photos"] == len(run.names) + len(BAD)
+    assert run.report["totals"]["skipped"] == len(BAD)
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_each_bad_file_is_named_with_its_reason(run, name):
+    (row,) = [row for row in run.report["photos"] if row["name"] == name]
+    assert row["skipped"]["reason"] == BAD[name]
+    assert not row["registered"]
+    lines = run.stdout.splitlines()
+    # Once when it comes, once in the summary.
+    assert [line for line in lines if line.startswith(f"skipped {name}: {BAD[name]}")]
+    assert [line for line in lines if line.startswith(f"  {name}: {BAD[name]}")]
+
+
+def test_every_good_photo_is_registered(run):
+    (model,) = run.report["models"]
+    assert model["registered"] == len(run.names)
+    assert {row["name"] for row in run.report["photos"] if row["registered"]} == set(run.names)
+
+
+def test_the_poses_are_true(run):
+    gt = pycolmap.Reconstruction(VILLAGE / "gt")
+    renamed = {
+        f"{SUB_FOLDER}/Bild {image.name}": image.cam_from_world() for image in gt.images.values()
+    }
+    errors = pose_errors(
+        make_model(renamed), [pycolmap.Reconstruction(run.output / "sparse" / "0")]
+    )
+    assert auc(errors)[-1] > AUC_AT_5_DEG
+
+
+def test_photos_are_in_the_database_under_their_names(run):
+    with pycolmap.Database.open(run.output / "database.db") as database:
+        assert {image.name for image in database.read_all_images()} == set(run.names)
+        assert database.num_cameras() == 1
+        assert database.num_pose_priors() == len(run.names)
+
+
+def test_keypoints_are_in_pixels_of_the_file(run):
+    """The photos were reduced from 1000 to 640 pixels."""
+    with pycolmap.Database.open(run.output / "database.db") as database:
+        (camera,) = database.read_all_cameras()
+        keypoints = np.concatenate([database.read_keypoints(i + 1) for i in range(3)])
+    assert (camera.width, camera.height) == (1000, 750)
+    assert keypoints[:, :2].max(axis=0) == pytest.approx((1000, 750), rel=0.1)
+    assert camera.mean_focal_length() == pytest.approx(812.4, rel=0.01)
+
+
+def test_the_summary_closes_the_output(run):
+    count = len(run.names)
+    photos = run.report["totals"]["photos"]
+    assert f"{count} of {photos} photos registered in 1 model" in run.stdout
+    assert re.search(rf"^photo {photos}/{photos}  registered \d+  points \d+", run.stdout, re.M)
+
+
+@pytest.fixture
+def five(tmp_path) -> Path:
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for photo in sorted((VILLAGE / "images").iterdir())[:5]:
+        shutil.copy(photo, folder / photo.name)
+    return folder
+
+
+def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int) -> None:
+    """Send Ctrl-C when so many photos have been shown."""
+    show = ProgressLine.show
+    shown = []
+
+    def show_and_interrupt(line: ProgressLine, step: object) -> None:
+        show(line, step)
+        shown.append(step)
+        if len(shown) == photos:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(ProgressLine, "show", show_and_interrupt)
+
+
+def test_ctrl_c_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypatch, capsys):
+    interrupt_after(monkeypatch, 4)
+    handler = signal.getsignal(signal.SIGINT)
+    assert reconstruct(five, tmp_path / "out") == 0
+    assert "stopping: finishing with the photos taken so far" in capsys.readouterr().out
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 5)]
+    model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+    assert model.num_reg_images() == report["totals"]["registered"] >= 3
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch, capsys):
+    interrupt_after(monkeypatch, 1)
+    assert reconstruct(five, tmp_path / "out") == 1
+    assert "no model could be built" in capsys.readouterr().out
+    assert list((tmp_path / "out" / "sparse").iterdir()) == []
+    assert (tmp_path / "out" / "report.json").exists()
+
+
+def test_one_thread_and_a_seed_repeat_to_the_bit(five, tmp_path):
+    for name in ("a", "b"):
+        assert reconstruct(five, tmp_path / name, "--threads", "1", "--seed", "3") == 0
+    models = [
+        {path.name: path.read_bytes() for path in (tmp_path / name / "sparse" / "0").iterdir()}
+        for name in ("a", "b")
+    ]
+    assert models[0] == models[1]
+    assert "points3D.bin" in models[0]
+    first, second = (tables(tmp_path / name / "database.db") for name in ("a", "b"))
+    assert first == second
+    # What runs ahead and side by side changes nothing of what is found and matched.
+    assert reconstruct(five, tmp_path / "c", "--threads", "3", "--seed", "3") == 0
+    assert tables(tmp_path / "c" / "database.db") == first
+
+
+def test_overwrite_replaces_what_a_session_wrote_and_nothing_else(five, tmp_path):
+    output = tmp_path / "out"
+    output.mkdir()
+    (output / "notes.txt").write_text("mine")
+    (output / "database.db").write_bytes(b"of an earlier session")
+    (output / "sparse" / "7").mkdir(parents=True)
+    for photo in sorted(five.iterdir())[2:]:
+        photo.unlink()
+    assert reconstruct(five, output, "--overwrite") in (0, 1)
+    assert (output / "notes.txt").read_text() == "mine"
+    assert not (output / "sparse" / "7").exists()
+    with pycolmap.Database.open(output / "database.db") as database:
+        assert database.num_images() == 2
+
+
+def test_random_order_is_the_seeds(five, tmp_path):
+    output = tmp_path / "out"
+    reconstruct(five, output, "--order", "random", "--seed", "2", "--max-features", "50")
+    rows = json.loads((output / "report.json").read_text())["photos"]
+    expected = [photo.name for photo in order_photos(list_photos(five), "random", seed=2)]
+    assert [row["name"] for row in rows] == expected != sorted(expected)
+
+
+def test_text_is_written_beside_the_binary_form(five, tmp_path):
+    assert reconstruct(five, tmp_path / "out", "--text") == 0
+    model = tmp_path / "out" / "sparse" / "0"
+    assert {"images.bin", "images.txt", "points3D.ply"} <= {path.name for path in model.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("folder", "output"),
+    [
+        ("flight", "outputs/flight"),
+        ("flight/", "outputs/flight"),
+        ("a/village/images", "outputs/village"),
+        ("a/village/Images", "outputs/village"),
+    ],
+)
+def test_the_output_is_named_after_the_folder(folder, output):
+    assert default_output(Path(folder)) == Path(output)

@@ -1,0 +1,1 @@
+"""Scenes, photos and models that tests are made with."""

@@ -1,0 +1,247 @@
+"""Several models at once, over scenes with known truth and true matches."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.photo_stream import SceneFeed, position_errors_m, registered_names, true_pair
+
+from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.mapping.atlas import Atlas, AtlasOptions
+from sfm_front.mapping.model import MapperOptions, Model
+from sfm_front.mapping.view_graph import Scene
+from sfm_front.types import PairGeometry
+
+NUM_PHOTOS = 16
+# The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
+POSITION_TOLERANCE_M = 0.15
+OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
+
+
+@pytest.fixture(scope="module")
+def orbit() -> SyntheticScene:
+    return make_scene(NUM_PHOTOS, 500, seed=4, layout="orbit")
+
+
+def run(feed: SceneFeed, indices: Iterable[int]) -> Atlas:
+    """Photos added one at a time; the atlas before ``finish``."""
+    atlas = Atlas(feed.scene, OPTIONS)
+    for index in indices:
+        atlas.add(feed.add(index))
+    return atlas
+
+
+def assert_whole(atlas: Atlas, scene: SyntheticScene) -> None:
+    """One model, of all photos, and true."""
+    assert [model.num_registered for model in atlas.models] == [len(scene)]
+    assert atlas.waiting == []
+    errors = position_errors_m(atlas.models[0].reconstruction, scene)
+    assert errors.max() < POSITION_TOLERANCE_M
+
+
+def test_photos_in_order_are_placed_as_they_arrive(orbit):
+    feed = SceneFeed(orbit)
+    atlas = Atlas(feed.scene, OPTIONS)
+    assert atlas.registered == set()
+    placed = [atlas.add(feed.add(index)) for index in range(NUM_PHOTOS)]
+    ids = [image_id for step in placed for image_id in step]
+    assert sorted(ids) == list(range(1, NUM_PHOTOS + 1))
+    # Once there is a model, each photo is placed when it comes.
+    assert placed[4:] == [[image_id] for image_id in range(5, NUM_PHOTOS + 1)]
+    atlas.finish()
+    assert_whole(atlas, orbit)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_photos_in_any_order_are_all_placed(orbit, seed):
+    order = list(range(NUM_PHOTOS))
+    random.Random(seed).shuffle(order)
+    atlas = run(SceneFeed(orbit), order)
+    atlas.finish()
+    assert_whole(atlas, orbit)
+
+
+def test_a_stream_that_begins_badly_ends_whole():
+    """So few points that the first photos carry no model, or one that does not grow."""
+    sparse = make_scene(NUM_PHOTOS, 250, seed=4, layout="orbit")
+    atlas = run(SceneFeed(sparse), range(NUM_PHOTOS))
+    atlas.finish()
+    assert_whole(atlas, sparse)
+
+
+def test_photos_with_few_points_are_a_model_when_no_more_will_come():
+    poor = make_scene(NUM_PHOTOS, 100, seed=1, layout="orbit", background_ratio=0.0)
+    atlas = run(SceneFeed(poor), range(5))
+    assert atlas.models == []
+    atlas.finish()
+    assert [model.num_registered for model in atlas.models] == [5]
+
+
+def test_a_camera_that_photos_do_not_tell_is_held(orbit, monkeypatch):
+    """Stands in for a flight over flat ground, where focal length and distortion drift away."""
+    monkeypatch.setattr(
+        Model, "is_miscalibrated", property(lambda model: model._options.refine_intrinsics)
+    )
+    other = make_scene(NUM_PHOTOS, 500, seed=5, layout="orbit")
+    feed = SceneFeed(orbit)
+    atlas = run(feed, range(NUM_PHOTOS))
+    elsewhere = SceneFeed(other, feed.scene, prefix="b/")
+    for index in range(8):
+        atlas.add(elsewhere.add(index))
+    atlas.finish()
+    assert [model.registered for model in atlas.models] == [
+        set(feed.index_of),
+        set(elsewhere.index_of),
+    ]
+    assert position_errors_m(atlas.models[0].reconstruction, orbit).max() < POSITION_TOLERANCE_M
+    for model in atlas.models:
+        camera = model.reconstruction.camera(1)
+        np.testing.assert_array_equal(camera.params, orbit.camera.params)
+    held = [event for event in atlas.take_events() if "the camera held" in event]
+    assert len(held) == 2
+
+
+def test_two_places_are_two_models(orbit):
+    other = make_scene(NUM_PHOTOS, 500, seed=5, layout="orbit")
+    feed = SceneFeed(orbit)
+    elsewhere = SceneFeed(other, feed.scene, prefix="b/")
+    atlas = Atlas(feed.scene, OPTIONS)
+    for index in range(NUM_PHOTOS):  # by turns, as long as the smaller place has photos
+        atlas.add(feed.add(index))
+        if index < 8:
+            atlas.add(elsewhere.add(index))
+    atlas.finish()
+    assert [model.registered for model in atlas.models] == [
+        set(feed.index_of),
+        set(elsewhere.index_of),
+    ]
+    for model, scene, prefix in zip(atlas.models, (orbit, other), ("", "b/"), strict=True):
+        errors = position_errors_m(model.reconstruction, scene, prefix=prefix)
+        assert errors.max() < POSITION_TOLERANCE_M
+
+
+def test_models_that_come_to_connect_are_joined(orbit):
+    feed = SceneFeed(orbit)
+    atlas = Atlas(feed.scene, OPTIONS)
+    for index in [*range(5), *range(8, 13)]:
+        atlas.add(feed.add(index))
+    assert [model.num_registered for model in atlas.models] == [5, 5]
+    atlas.take_events()
+    for index in [5, 6, 7, 13, 14, 15]:
+        atlas.add(feed.add(index))
+    atlas.finish()
+    assert_whole(atlas, orbit)
+    assert any("joined" in event for event in atlas.take_events())
+
+
+class TruckFeed(SceneFeed):
+    """The first three photos, from all around the place, show the same truck, which drove along:
+    pairs that are sound among themselves and say nothing true about where the photos stand."""
+
+    PLACES = (0, 5, 10)
+
+    def __init__(self, place: SyntheticScene, truck: SyntheticScene) -> None:
+        super().__init__(place)
+        self._truck = truck
+        for number, index in enumerate(self.PLACES):
+            # The truck's keypoints stand behind those of the place.
+            of_place, of_truck = place.photo(index).features, truck.photo(number).features
+            keypoints = np.concatenate([of_place.keypoints, of_truck.keypoints])
+            pairs = [self._truck_pair(number, other) for other in range(number)]
+            self.scene.add(number + 1, place.name(index), self._camera, keypoints, pairs)
+            self.index_of[number + 1] = index
+
+    def _truck_pair(self, number: int, other: int) -> PairGeometry:
+        pair = true_pair(self._truck, number, other, (number + 1, other + 1))
+        before = [len(self.synthetic.photo(self.PLACES[n]).features) for n in (number, other)]
+        matches = pair.matches + np.array(before, np.uint32)
+        pair.two_view_geometry.inlier_matches = matches
+        return replace(pair, matches=matches)
+
+
+def test_a_bad_start_is_recovered_from(orbit):
+    feed = TruckFeed(orbit, make_scene(NUM_PHOTOS, 400, seed=6, layout="orbit"))
+    atlas = Atlas(feed.scene, OPTIONS)
+    atlas.add(3)
+    assert atlas.registered == {1, 2, 3}
+    for index in sorted(set(range(NUM_PHOTOS)) - set(feed.PLACES)):
+        atlas.add(feed.add(index))
+    atlas.finish()
+    assert_whole(atlas, orbit)
+
+
+def test_a_wrong_focal_length_at_the_start_does_not_last(orbit):
+    feed = SceneFeed(orbit)
+    feed._camera.params = [2.0 * 1300.0, 800.0, 600.0, 0.0]
+    atlas = run(feed, range(NUM_PHOTOS))
+    atlas.finish()
+    assert_whole(atlas, orbit)
+    (camera,) = atlas.models[0].reconstruction.cameras.values()
+    assert camera.mean_focal_length() == pytest.approx(1300, rel=0.02)
+
+
+def test_what_is_linked_to_nothing_says_so(orbit):
+    feed = SceneFeed(orbit)
+    atlas = run(feed, range(6))
+    stranger = SceneFeed(make_scene(4, 100, seed=7), feed.scene, prefix="b/")
+    image_id = stranger.add(0)
+    assert atlas.add(image_id) == []
+    atlas.finish()
+    assert atlas.waiting == [image_id]
+    assert atlas.why_not_registered(image_id) == "no verified matches with any photo"
+
+
+def test_two_photos_that_know_only_each_other_say_so(orbit):
+    feed = SceneFeed(orbit)
+    atlas = run(feed, range(6))
+    pair = SceneFeed(make_scene(12, 400, seed=7, layout="orbit"), feed.scene, prefix="b/")
+    ids = []
+    for index in (0, 1):
+        ids.append(pair.add(index))
+        atlas.add(ids[-1])
+    atlas.finish()
+    assert atlas.waiting == ids
+    assert {atlas.why_not_registered(image_id) for image_id in ids} == {
+        "verified matches only with photos that are not registered"
+    }
+
+
+def test_events_tell_how_models_began_and_are_told_once(orbit):
+    atlas = run(SceneFeed(orbit), range(6))
+    (event,) = atlas.take_events()
+    assert event.startswith("model started from images ")
+    assert atlas.take_events() == ()
+
+
+def test_an_atlas_without_photos_or_matches_ends_without_models():
+    atlas = Atlas(Scene(), OPTIONS)
+    assert atlas.waiting == []
+    stranger = SceneFeed(make_scene(1, 50, seed=8))
+    alone = run(stranger, [0])
+    alone.finish()
+    assert alone.models == []
+    assert registered_names([]) == set()
+    assert alone.why_not_registered(1) == "no verified matches with any photo"
+
+
+def test_the_cost_of_global_refinement_stays_amortised(orbit, monkeypatch):
+    """Sizes at which the growing model was refined as a whole, against the geometric series."""
+    from sfm_front.mapping import model as mapper
+
+    sizes: list[int] = []
+    refine = mapper.Model._refine
+
+    def counted(model: mapper.Model, *arguments: object) -> None:
+        sizes.append(model.num_registered)
+        refine(model, *arguments)
+
+    monkeypatch.setattr(mapper.Model, "_refine", counted)
+    atlas = run(SceneFeed(orbit), range(NUM_PHOTOS))
+    growth = OPTIONS.mapper.schedule.growth
+    assert atlas.models[0].num_registered == NUM_PHOTOS
+    # Photos and points each have their series.
+    assert sum(sizes) <= 2 * NUM_PHOTOS * growth / (growth - 1)

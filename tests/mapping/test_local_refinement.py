@@ -1,0 +1,95 @@
+"""Adjustment around new photos: as COLMAP's for one of them, and shared in large models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pycolmap
+import pytest
+from helpers.photo_stream import SceneFeed
+
+from sfm_front.evaluation.poses import pose_errors
+from sfm_front.evaluation.synthetic.scene import make_scene
+from sfm_front.mapping import local_refinement
+from sfm_front.mapping.local_refinement import LocalRefinement
+from sfm_front.mapping.model import MapperOptions
+
+NUM_PHOTOS = 8
+POSE_TOLERANCE_DEG = 0.02
+OPTIONS = MapperOptions(num_threads=1).streaming()
+Refine = Callable[[pycolmap.IncrementalMapper, int], None]
+
+
+def grown(refine: Refine) -> pycolmap.Reconstruction:
+    """A model of an orbit after two photos and then one more at a time, each refined around."""
+    feed = SceneFeed(make_scene(14, 500, seed=3, layout="orbit", noise_px=0.5))
+    feed.add_all(range(NUM_PHOTOS))
+    mapper, model = feed.scene.new_mapper()
+    mapping, triangulation = OPTIONS.get_mapper(), OPTIONS.get_triangulation()
+    mapping.init_min_tri_angle, mapping.init_min_num_inliers = 8, 50
+    pose = mapper.estimate_initial_two_view_geometry(mapping, 2, 1)
+    mapper.register_initial_image_pair(mapping, 2, 1, pose)
+    for image_id in (1, 2):
+        mapper.triangulate_image(triangulation, image_id)
+    mapper.adjust_global_bundle(mapping, OPTIONS.get_global_bundle_adjustment())
+    mapper.clear_modified_points3D()
+    for image_id in range(3, NUM_PHOTOS + 1):
+        assert mapper.register_next_image(mapping, image_id)
+        mapper.triangulate_image(triangulation, image_id)
+        refine(mapper, image_id)
+    return model
+
+
+def by_colmap(mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
+    mapper.iterative_local_refinement(
+        1,
+        OPTIONS.ba_local_max_refinement_change,
+        OPTIONS.get_mapper(),
+        OPTIONS.get_local_bundle_adjustment(),
+        OPTIONS.get_triangulation(),
+        image_id,
+    )
+    mapper.clear_modified_points3D()
+
+
+def test_around_one_photo_it_is_what_colmap_does():
+    ours = LocalRefinement(OPTIONS)
+    mine, theirs = grown(ours.add), grown(by_colmap)
+    assert mine.num_points3D() == theirs.num_points3D() > 100
+    assert mine.compute_num_observations() == theirs.compute_num_observations()
+    # The three points that hold the model may be others: its place is free, its shape is not.
+    assert pose_errors(theirs, [mine]).max() < POSE_TOLERANCE_DEG
+    unrefined = grown(lambda mapper, _: mapper.clear_modified_points3D())
+    assert pose_errors(theirs, [unrefined]).max() > 5 * POSE_TOLERANCE_DEG
+
+
+def test_photos_of_a_large_model_share_an_adjustment(monkeypatch):
+    monkeypatch.setattr(local_refinement, "photos_together", lambda _: 3)
+    adjusted: list[int] = []
+    ours = LocalRefinement(OPTIONS)
+
+    def add(mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
+        ours.add(mapper, image_id)
+        adjusted.append(len(mapper.get_modified_points3D()))
+
+    together = grown(add)
+    # Of six photos the third and the sixth: what changed before is kept for them.
+    assert [count > 0 for count in adjusted] == [True, True, False, True, True, False]
+    assert together.compute_mean_reprojection_error() == pytest.approx(
+        grown(by_colmap).compute_mean_reprojection_error(), rel=0.05
+    )
+
+
+def test_what_was_refined_with_the_whole_model_is_forgotten(monkeypatch):
+    monkeypatch.setattr(local_refinement, "photos_together", lambda _: 2)
+    ours = LocalRefinement(OPTIONS)
+    waiting: list[bool] = []
+
+    def add(mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
+        ours.add(mapper, image_id)
+        if image_id == 3:
+            ours.forget(mapper)
+        waiting.append(len(mapper.get_modified_points3D()) > 0)
+
+    grown(add)
+    assert waiting == [False, True, False, True, False, True]

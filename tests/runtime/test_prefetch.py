@@ -1,0 +1,110 @@
+"""Mapping ahead: order, bounds, errors, and the limits on libraries meanwhile."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+
+import cv2
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from sfm_front.runtime.prefetch import map_ahead
+
+
+def test_results_come_in_the_items_order_whatever_finishes_first():
+    def slow_first(item: int) -> int:
+        time.sleep(0.05 if item == 0 else 0)
+        return item * item
+
+    assert list(map_ahead(slow_first, range(7), num_threads=3)) == [n * n for n in range(7)]
+
+
+def test_no_more_items_are_taken_than_twice_the_threads_ahead():
+    taken = []
+
+    def items() -> Iterator[int]:
+        for number in range(100):
+            taken.append(number)
+            yield number
+
+    results = map_ahead(lambda item: item, items(), num_threads=2)
+    assert next(results) == 0
+    assert len(taken) == 4
+    assert next(results) == 1
+    assert len(taken) == 5
+    results.close()
+
+
+def test_it_works_on_several_threads_at_once():
+    meeting = threading.Barrier(2, timeout=10)
+    assert len(list(map_ahead(lambda _: meeting.wait(), range(2), num_threads=2))) == 2
+
+
+def test_an_error_reaches_the_caller_in_its_turn():
+    def fail_at_two(item: int) -> int:
+        if item == 2:
+            raise ValueError("two")
+        return item
+
+    results = map_ahead(fail_at_two, range(5), num_threads=2)
+    assert [next(results), next(results)] == [0, 1]
+    with pytest.raises(ValueError, match="two"):
+        next(results)
+
+
+def library_threads() -> tuple[int, set[int]]:
+    """How many threads OpenCV and matrix products run on."""
+    blas = {
+        library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"
+    }
+    return cv2.getNumThreads(), blas
+
+
+@pytest.mark.parametrize("end", ["last result", "closed", "error"])
+def test_libraries_run_on_one_thread_until_the_end(end):
+    def use(item: int) -> tuple[int, set[int]]:
+        if item == 1 and end == "error":
+            raise ValueError
+        return library_threads()
+
+    opencv_before = cv2.getNumThreads()
+    cv2.setNumThreads(3)
+    try:
+        with threadpool_limits(2, user_api="blas"):
+            results = map_ahead(use, range(3), num_threads=2)
+            assert next(results) == (1, {1})
+            assert library_threads() == (1, {1})
+            if end == "last result":
+                assert list(results) == [(1, {1})] * 2
+            elif end == "closed":
+                results.close()
+            else:
+                with pytest.raises(ValueError):  # noqa: PT011
+                    next(results)
+            assert library_threads() == (3, {2})
+    finally:
+        cv2.setNumThreads(opencv_before)
+
+
+def test_closed_early_it_starts_nothing_more():
+    started = []
+    both_are_busy = threading.Barrier(3, timeout=10)
+    let_go = threading.Event()
+
+    def wait(item: int) -> int:
+        started.append(item)
+        if item > 0:
+            both_are_busy.wait()
+            assert let_go.wait(10)
+        return item
+
+    results = map_ahead(wait, range(4), num_threads=2)
+    assert next(results) == 0
+    both_are_busy.wait()
+    # Closing waits for the items that are worked on.
+    threading.Timer(0.3, let_go.set).start()
+    results.close()
+    assert sorted(started) == [0, 1, 2]
+    assert not any(thread.name.startswith("sfm-ahead") for thread in threading.enumerate())

@@ -1,0 +1,268 @@
+"""A whole session on photos that are described already."""
+
+from __future__ import annotations
+
+import json
+import random
+import sqlite3
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+import pytest
+from helpers.photo_stream import described, position_errors_m, registered_names, true_matches
+
+from sfm_front.errors import ConfigError, InputError
+from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.mapping.atlas import AtlasOptions
+from sfm_front.mapping.model import MapperOptions
+from sfm_front.photos.cameras import CameraOptions
+from sfm_front.session.options import SessionOptions
+from sfm_front.session.session import Session
+from sfm_front.types import ModelSummary, Skipped, SkipReason, StepReport
+
+NUM_PHOTOS = 16
+# The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
+POSITION_TOLERANCE_M = 0.3
+ESSENTIAL_TOLERANCE = 1e-3
+OUTLIERS = 0.05
+
+
+def options(threads: int = 1, **changes: object) -> SessionOptions:
+    defaults = {
+        "global_descriptor": "vlad",
+        "threads": threads,
+        "atlas": AtlasOptions(mapper=MapperOptions(num_threads=threads)),
+    }
+    return SessionOptions(**(defaults | changes))
+
+
+@pytest.fixture(scope="module")
+def orbit() -> SyntheticScene:
+    return make_scene(NUM_PHOTOS, 400, seed=1, layout="orbit", outlier_ratio=OUTLIERS)
+
+
+@pytest.fixture(scope="module")
+def session(orbit, tmp_path_factory) -> tuple[Path, list[StepReport], list[ModelSummary]]:
+    """Output folder, steps and models of the orbit in its order, the camera unknown."""
+    output = tmp_path_factory.mktemp("session")
+    with Session(output, options()) as session:
+        steps = [session.take(described(orbit, index)) for index in range(NUM_PHOTOS)]
+        models = session.finish()
+    return output, steps, models
+
+
+def tables(database: Path) -> dict[str, list[tuple[object, ...]]]:
+    """The content of a database, table by table."""
+    with sqlite3.connect(database) as connection:
+        names = [
+            name
+            for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type='table'")
+        ]
+        return {name: connection.execute(f'SELECT * FROM "{name}"').fetchall() for name in names}
+
+
+def test_every_photo_is_registered_at_its_true_place(orbit, session):
+    _, _, models = session
+    assert [model.num_registered for model in models] == [NUM_PHOTOS]
+    errors = position_errors_m(models[0].reconstruction, orbit)
+    assert errors.max() < POSITION_TOLERANCE_M
+
+
+def test_the_focal_length_is_found(orbit, session):
+    _, _, models = session
+    (camera,) = models[0].reconstruction.cameras.values()
+    assert camera.mean_focal_length() == pytest.approx(orbit.camera.mean_focal_length(), rel=0.02)
+
+
+def test_pycolmap_on_its_own_builds_as_much_from_the_database(session, tmp_path):
+    """The database is not changed, and no option is but those that make the run repeatable."""
+    output, _, models = session
+    pipeline = pycolmap.IncrementalPipelineOptions(num_threads=1)
+    built = pycolmap.incremental_mapping(
+        output / "database.db", tmp_path, tmp_path / "sparse", pipeline
+    )
+    assert max(model.num_reg_images() for model in built.values()) == models[0].num_registered
+
+
+def test_the_models_are_on_disk(session):
+    output, _, models = session
+    read = pycolmap.Reconstruction(output / "sparse" / "0")
+    assert models[0].path == output / "sparse" / "0"
+    assert registered_names([read]) == registered_names([models[0].reconstruction])
+    assert read.num_points3D() == models[0].num_points
+    assert models[0].mean_reprojection_error_px < 1.0
+    assert models[0].mean_track_length > 2.0
+
+
+def test_a_step_says_what_was_retrieved_and_placed(orbit, session):
+    _, steps, _ = session
+    assert [step.image_id for step in steps] == list(range(1, NUM_PHOTOS + 1))
+    first, last = steps[0], steps[-1]
+    assert first.candidates == ()
+    assert first.most_relevant is None
+    assert last.num_keypoints == len(orbit.photo(NUM_PHOTOS - 1).features)
+    assert len(last.candidates) == NUM_PHOTOS - 1
+    shared = {
+        orbit.name(i): len(true_matches(orbit, NUM_PHOTOS - 1, i)) for i in range(NUM_PHOTOS - 1)
+    }
+    # The neighbours on both sides of the circle.
+    assert last.most_relevant in sorted(shared, key=shared.get, reverse=True)[:2]
+    assert last.verified[0] == last.most_relevant
+    assert len(last.verified) <= SessionOptions().matched
+    names = [name for step in steps for name in step.registered]
+    assert sorted(names) == [orbit.name(index) for index in range(NUM_PHOTOS)]
+    assert last.num_registered == NUM_PHOTOS
+    assert {"retrieve", "rerank", "match", "verify", "store", "map"} <= set(last.seconds)
+
+
+def test_a_photo_that_can_be_located_is_matched_guided(session):
+    output, steps, _ = session
+    assert "guide" not in steps[1].seconds
+    assert "guide" in steps[-1].seconds
+    with pycolmap.Database.open(output / "database.db") as database:
+        geometries = [
+            database.read_two_view_geometry(NUM_PHOTOS, image_id)
+            for image_id in range(1, NUM_PHOTOS)
+            if database.exists_two_view_geometry(NUM_PHOTOS, image_id)
+        ]
+    assert len(geometries) == len(steps[-1].verified) > SessionOptions().unguided
+    # Each says where the photos stand to each other, in the same way whoever found it.
+    for geometry in geometries:
+        assert np.linalg.norm(geometry.cam2_from_cam1.translation) == pytest.approx(1)
+        essential = pycolmap.essential_matrix_from_pose(geometry.cam2_from_cam1)
+        cosine = (essential * geometry.E).sum() / np.linalg.norm(essential)
+        assert abs(cosine) / np.linalg.norm(geometry.E) > 1 - ESSENTIAL_TOLERANCE
+
+
+def test_a_report_does_not_hold_on_to_matches(session):
+    _, steps, _ = session
+    assert all(c.matches is None for step in steps for c in step.candidates)
+
+
+def test_reports_are_written(session):
+    output, steps, _ = session
+    lines = (output / "retrieval.jsonl").read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["name"] for line in lines] == [step.name for step in steps]
+    report = json.loads((output / "report.json").read_text(encoding="utf-8"))
+    assert report["totals"]["registered"] == NUM_PHOTOS
+    assert all(row["registered"] and row["model"] == 0 for row in report["photos"])
+    assert set(report["end"]["seconds"]) == {"finish", "export"}
+
+
+def test_shuffled_photos_are_all_registered(orbit, tmp_path):
+    order = list(range(NUM_PHOTOS))
+    random.Random(1).shuffle(order)
+    with Session(tmp_path / "out", options()) as session:
+        for index in order:
+            session.take(described(orbit, index))
+        models = session.finish()
+    assert [model.num_registered for model in models] == [NUM_PHOTOS]
+    assert position_errors_m(models[0].reconstruction, orbit).max() < POSITION_TOLERANCE_M
+
+
+def test_two_places_give_two_models_the_largest_first(tmp_path):
+    places = [make_scene(16, 400, seed=seed, layout="orbit") for seed in (2, 3)]
+    with Session(tmp_path / "out", options()) as session:
+        for index in range(10):
+            for number, place in enumerate(places):
+                if number == 1 or index < 6:
+                    session.take(described(place, index, prefix=f"{number}/"))
+        models = session.finish()
+    assert [model.path.name for model in models] == ["0", "1"]
+    assert [registered_names([model.reconstruction]) for model in models] == [
+        {f"1/{places[1].name(index)}" for index in range(10)},
+        {f"0/{places[0].name(index)}" for index in range(6)},
+    ]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_the_database_does_not_depend_on_the_threads(orbit, session, tmp_path, threads):
+    output, _, _ = session
+    with Session(tmp_path / "out", options(threads)) as other:
+        for index in range(NUM_PHOTOS):
+            other.take(described(orbit, index))
+    assert tables(tmp_path / "out" / "database.db") == tables(output / "database.db")
+
+
+def test_with_one_thread_the_models_are_the_same_to_the_bit(orbit, tmp_path):
+    written = []
+    for name in ("a", "b"):
+        with Session(tmp_path / name, options()) as session:
+            for index in range(8):
+                session.take(described(orbit, index))
+            session.finish()
+        sparse = tmp_path / name / "sparse"
+        written.append({p.relative_to(sparse): p.read_bytes() for p in sparse.rglob("*.*")})
+    assert len(written[0]) >= 6
+    assert written[0] == written[1]
+
+
+def test_a_known_calibration_is_used(orbit, tmp_path):
+    cameras = CameraOptions(params=tuple(orbit.camera.params))
+    with Session(tmp_path / "out", options(cameras=cameras)) as session:
+        session.take(described(orbit, 0))
+    with pycolmap.Database.open(tmp_path / "out" / "database.db") as database:
+        (camera,) = database.read_all_cameras()
+    np.testing.assert_array_equal(camera.params, orbit.camera.params)
+    assert camera.has_prior_focal_length
+
+
+def test_duplicates_and_skipped_photos_take_no_image_id(orbit, tmp_path):
+    photo = described(orbit, 0)
+    copy = replace(photo, name="copy.jpg")
+    unreadable = Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")
+    with Session(tmp_path / "out", options()) as session:
+        steps = [session.take(p) for p in (photo, copy, unreadable, described(orbit, 1))]
+        session.finish()
+    assert [step.image_id for step in steps] == [1, None, None, 2]
+    assert steps[1].skipped == Skipped("copy.jpg", SkipReason.DUPLICATE, "same file as 000000.jpg")
+    assert steps[2].skipped == unreadable
+    rows = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))["photos"]
+    assert [row["name"] for row in rows] == [step.name for step in steps]
+
+
+def test_a_photo_that_is_no_file_is_skipped_by_add(tmp_path):
+    with Session(tmp_path / "out", options()) as session:
+        step = session.add(tmp_path / "none.jpg")
+        assert step.name == "none.jpg"
+        assert step.skipped is not None
+        assert step.skipped.reason is SkipReason.UNREADABLE
+
+
+def test_no_photos_no_models(tmp_path):
+    with Session(tmp_path / "out", options()) as session:
+        assert session.finish() == []
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["totals"]["photos"] == 0
+
+
+def test_a_session_does_not_write_over_another(session):
+    output, _, _ = session
+    before = (output / "report.json").read_bytes()
+    with pytest.raises(InputError, match="holds a reconstruction already"):
+        Session(output, options())
+    assert (output / "report.json").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"matched": 0}, "matched must be at least 1, got 0"),
+        ({"unguided": 0}, "unguided must be at least 1, got 0"),
+        ({"threads": 0}, "threads must be at least 1, got 0"),
+        ({"global_descriptor": "bag"}, "no global descriptor is called 'bag'"),
+        ({"max_features": 0}, "max_features must be at least 1"),
+        ({"max_image_size": 10}, "max_image_size must be at least"),
+    ],
+)
+def test_values_out_of_range_are_refused_before_anything_is_written(tmp_path, wrong, message):
+    with pytest.raises(ConfigError, match=message):
+        Session(tmp_path / "out", SessionOptions(**({"global_descriptor": "vlad"} | wrong)))
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_package_offers_the_session():
+    from sfm_front import Session as Offered
+
+    assert Offered is Session
