@@ -110,7 +110,7 @@ class Features:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DescribedPhoto:
+class ExtractedPhoto:
     """A photo that is ready to be retrieved, matched and mapped; its pixels are gone."""
 
     name: str
@@ -129,15 +129,15 @@ class Candidate:
     """A photo that may overlap the query.
 
     ``cosine`` of the global vectors in [-1, 1]; ``inliers``: SIFT matches that survived RANSAC,
-    None where the candidate was not re-ranked; ``turn_rad``: how far keypoints turn from the query
-    to the candidate in the image plane, None where that is not known; ``matches`` (K, 2): these
-    inliers, keypoint indices in the query and in the candidate.
+    None if the candidate was not re-ranked; ``rotation_rad``: in-plane rotation from the query to
+    the candidate, None if it is not known; ``matches`` (K, 2): these inliers, keypoint indices in
+    the query and in the candidate.
     """
 
     image_id: int
     cosine: float
     inliers: int | None = None
-    turn_rad: float | None = None
+    rotation_rad: float | None = None
     matches: Uint32Array | None = field(default=None, repr=False, compare=False)
 
 
@@ -169,7 +169,7 @@ class PairGeometry:
 
 
 # Stages that run ahead of a photo's turn, beside the mapping of those before it.
-STAGES_AHEAD = frozenset({"read", "sift", "vlad", "network"})
+PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})
 
 
 @dataclass(frozen=True, slots=True)

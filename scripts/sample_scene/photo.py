@@ -1,4 +1,4 @@
-"""Store a rendered picture as a drone's camera would: sensor noise, JPEG, EXIF with GPS."""
+"""PhotoDatabase a rendered picture as a drone's camera would: sensor noise, JPEG, EXIF with GPS."""
 
 from __future__ import annotations
 

@@ -56,7 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     retrieval = parser.add_argument_group("retrieval")
     shared.add_retrieval(retrieval)
     retrieval.add_argument(
-        "--matched", type=int, metavar="N", help="best of them matched on all features (default: 8)"
+        "--num-matched",
+        "--matched",
+        type=int,
+        metavar="N",
+        help="best of them matched on all features (default: 8)",
     )
     shared.add_machine(parser)
 
@@ -80,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
         for message in session.messages:
             print(message)
         progress = ProgressLine(len(photos), sys.stdout)
-        for step in session.stream(photos):
+        for step in session.add_all(photos):
             progress.show(step)
             if interrupted():
                 progress.note("stopping: finishing with the photos taken so far")
@@ -107,7 +111,7 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     from sfm_front.photos.cameras import CameraOptions
     from sfm_front.session.options import SessionOptions, available_cores
 
-    given = shared.given(arguments, "matched")
+    given = shared.given(arguments, "num_matched")
     threads = given.setdefault("threads", available_cores())
     cameras = {
         "mode": arguments.camera_mode,

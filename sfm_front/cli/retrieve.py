@@ -17,10 +17,10 @@ from sfm_front.cli.progress import CountLine
 from sfm_front.cli.reconstruct import default_output
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.photos.source import PhotoPath, list_photos
-from sfm_front.types import DescribedPhoto, Skipped
+from sfm_front.types import ExtractedPhoto, Skipped
 
 if TYPE_CHECKING:
-    from sfm_front.features.cached_extraction import CachedDescriber
+    from sfm_front.features.cached_extraction import CachedExtraction
     from sfm_front.search.folder_search import Answer, FolderSearch, SearchOptions
     from sfm_front.search.photo_index import PhotoIndex
     from sfm_front.session.options import SessionOptions
@@ -70,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="picture of the verified matches between the first query and its best photo",
     )
     output.add_argument(
+        "--ground-truth",
         "--truth",
         type=Path,
         metavar="FILE",
@@ -89,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Search; 0 if every query was answered, 1 if the folder has no other photo to find."""
     from sfm_front.runtime.devices import usable_device
-    from sfm_front.runtime.worker_pool import Workers
+    from sfm_front.runtime.worker_pool import WorkerPool
     from sfm_front.search.folder_search import FolderSearch
     from sfm_front.search.photo_index import PhotoIndex
 
@@ -106,7 +107,7 @@ def run(arguments: argparse.Namespace) -> int:
     index = PhotoIndex(location, describer)
     _update(index, photos, options.threads)
     described = [_describe(describer, query) for query in queries]
-    with Workers(options.threads) as workers:
+    with WorkerPool(options.threads) as workers:
         search = FolderSearch(index, search_options, workers, device=device)
         answers = [search.ask(query) for query in described]
         _show(arguments, answers, photos)
@@ -148,8 +149,8 @@ def _options(arguments: argparse.Namespace) -> tuple[SessionOptions, SearchOptio
     return session, search
 
 
-def _describer(options: SessionOptions, location: Path, device: str) -> CachedDescriber:
-    from sfm_front.features.cached_extraction import CachedDescriber
+def _describer(options: SessionOptions, location: Path, device: str) -> CachedExtraction:
+    from sfm_front.features.cached_extraction import CachedExtraction
     from sfm_front.features.global_descriptors.descriptor import resolve
     from sfm_front.features.sift import SiftExtractor
     from sfm_front.photos.reader import PhotoReader
@@ -157,7 +158,7 @@ def _describer(options: SessionOptions, location: Path, device: str) -> CachedDe
     descriptor, message = resolve(options.global_descriptor, weights=options.weights, device=device)
     if message:
         _note(message)
-    return CachedDescriber(
+    return CachedExtraction(
         location,
         PhotoReader(max_image_size=options.max_image_size),
         SiftExtractor(options.max_features),
@@ -179,7 +180,7 @@ def _update(index: PhotoIndex, photos: Sequence[PhotoPath], threads: int) -> Non
         _note(f"skipped {len(update.skipped) - _MOST_SKIPPED_TOLD} more")
 
 
-def _describe(describer: CachedDescriber, query: PhotoPath) -> DescribedPhoto:
+def _describe(describer: CachedExtraction, query: PhotoPath) -> ExtractedPhoto:
     described = describer.describe(query)
     if isinstance(described, Skipped):
         raise InputError(f"{query.path}: {described}. Give another --query.")
@@ -190,12 +191,12 @@ def _show(
     arguments: argparse.Namespace, answers: Sequence[Answer], photos: Sequence[PhotoPath]
 ) -> None:
     from sfm_front.cli import retrieve_output
-    from sfm_front.search.ground_truth import read_relevance
+    from sfm_front.search.ground_truth import read_ground_truth
     from sfm_front.viewers import pictures
 
     relevant: list[frozenset[str] | None] = [None] * len(answers)
-    if arguments.truth is not None:
-        truth = read_relevance(arguments.truth, [photo.name for photo in photos])
+    if arguments.ground_truth is not None:
+        truth = read_ground_truth(arguments.ground_truth, [photo.name for photo in photos])
         relevant = [truth.of(answer.query.name) for answer in answers]
     if arguments.json is not None:
         _write_rows(retrieve_output.rows(answers), arguments.json)
@@ -218,7 +219,7 @@ def _write_rows(rows: Sequence[object], file: Path) -> None:
 
 
 def _draw_matches(
-    file: Path, index: PhotoIndex, search: FolderSearch, query: DescribedPhoto, answer: Answer
+    file: Path, index: PhotoIndex, search: FolderSearch, query: ExtractedPhoto, answer: Answer
 ) -> None:
     from sfm_front.cli import retrieve_output
     from sfm_front.viewers import pictures

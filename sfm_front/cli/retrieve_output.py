@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sfm_front.search.folder_search import Answer, Found, VerifiedMatches
-from sfm_front.types import DescribedPhoto
+from sfm_front.types import ExtractedPhoto
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -69,7 +69,7 @@ def sheet(answers: Sequence[Answer], relevant: Sequence[Collection[str] | None])
 
 
 def matches_picture(
-    query: DescribedPhoto, other: DescribedPhoto, matches: VerifiedMatches
+    query: ExtractedPhoto, other: ExtractedPhoto, matches: VerifiedMatches
 ) -> Image:
     """Both photos and the lines between them."""
     from sfm_front.viewers.match_drawing import draw_matches

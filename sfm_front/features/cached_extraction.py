@@ -10,31 +10,31 @@ import numpy as np
 
 from sfm_front.features.feature_cache import (
     Box,
-    ContentKeys,
-    DescriptionFiles,
-    DescriptionSettings,
-    LocalDescription,
+    CachedFeatures,
+    CacheKeys,
+    ExtractionSettings,
+    FeatureCache,
 )
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader, file_digest
 from sfm_front.photos.source import PhotoPath
-from sfm_front.runtime.prefetch import map_ahead
-from sfm_front.types import DescribedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
+from sfm_front.runtime.prefetch import prefetch
+from sfm_front.types import ExtractedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recalled:
+class CachedPhoto:
     """A described photo, and its vectors by the names of the descriptors.
 
     ``photo.global_vector`` is that of the first descriptor.
     """
 
-    photo: DescribedPhoto
+    photo: ExtractedPhoto
     vectors: Mapping[str, Float32Array]
 
 
-class CachedDescriber:
+class CachedExtraction:
     """Describes photos; what is already in its folder is read from there. Threads may share it."""
 
     def __init__(
@@ -44,11 +44,11 @@ class CachedDescriber:
         sift: SiftExtractor,
         descriptors: Mapping[str, GlobalDescriptor],
     ) -> None:
-        self.files = DescriptionFiles(folder)
+        self.files = FeatureCache(folder)
         self._reader = reader
         self._sift = sift
         self._descriptors = dict(descriptors)
-        self.settings = DescriptionSettings(
+        self.settings = ExtractionSettings(
             reader.max_image_size,
             reader.min_image_size,
             sift.max_features,
@@ -57,7 +57,7 @@ class CachedDescriber:
 
     def describe(
         self, photo: PhotoPath, box: Box | None = None, *, digest: str | None = None
-    ) -> Recalled | Skipped:
+    ) -> CachedPhoto | Skipped:
         """Describe a photo, or the part of it in ``box``; keypoints are those of the whole file.
 
         ``digest``: that of the file, where it is known already. Raises InputError where
@@ -75,7 +75,7 @@ class CachedDescriber:
             if isinstance(made, Skipped):
                 return made
             local, vectors = made
-        described = DescribedPhoto(
+        described = ExtractedPhoto(
             name=photo.name,
             path=photo.path,
             width=local.width,
@@ -85,7 +85,7 @@ class CachedDescriber:
             features=local.features,
             global_vector=vectors[0] if vectors else np.zeros(0, np.float32),
         )
-        return Recalled(described, dict(zip(self._descriptors, vectors, strict=True)))
+        return CachedPhoto(described, dict(zip(self._descriptors, vectors, strict=True)))
 
     def stream(
         self,
@@ -93,17 +93,17 @@ class CachedDescriber:
         boxes: Mapping[str, Box] | None = None,
         *,
         num_threads: int,
-    ) -> Iterator[Recalled | Skipped]:
+    ) -> Iterator[CachedPhoto | Skipped]:
         """Describe photos in order, ``num_threads`` of them at a time; ``boxes`` by name."""
 
-        def describe(photo: PhotoPath) -> Recalled | Skipped:
+        def describe(photo: PhotoPath) -> CachedPhoto | Skipped:
             return self.describe(photo, None if boxes is None else boxes.get(photo.name))
 
-        return map_ahead(describe, photos, num_threads=num_threads)
+        return prefetch(describe, photos, num_threads=num_threads)
 
     def _make(
-        self, photo: PhotoPath, box: Box | None, keys: ContentKeys
-    ) -> tuple[LocalDescription, list[Float32Array]] | Skipped:
+        self, photo: PhotoPath, box: Box | None, keys: CacheKeys
+    ) -> tuple[CachedFeatures, list[Float32Array]] | Skipped:
         """Describe a photo, except for what is stored of it, and store the rest."""
         read = self._reader.read(photo.path, photo.name)
         if isinstance(read, Skipped):
@@ -114,7 +114,7 @@ class CachedDescriber:
             features = _moved(self._sift.extract(part), offset)
             if len(features) == 0:
                 return Skipped(photo.name, SkipReason.NO_FEATURES, "no texture to hold on to")
-            local = LocalDescription(read.width, read.height, read.exif, features)
+            local = CachedFeatures(read.width, read.height, read.exif, features)
             self.files.save_local(keys.features, local)
         vectors = []
         for key, descriptor in zip(keys.vectors, self._descriptors.values(), strict=True):

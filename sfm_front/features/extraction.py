@@ -10,10 +10,10 @@ from weakref import WeakSet
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.photos.source import PhotoPath
-from sfm_front.runtime.closeable import Closing
-from sfm_front.runtime.prefetch import map_ahead
+from sfm_front.runtime.closeable import Closeable
+from sfm_front.runtime.prefetch import prefetch
 from sfm_front.runtime.stopwatch import Stopwatch
-from sfm_front.types import DescribedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
+from sfm_front.types import ExtractedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
 
 
 class FeatureExtractor(Protocol):
@@ -22,7 +22,7 @@ class FeatureExtractor(Protocol):
     def extract(self, photo: Photo) -> Features: ...
 
 
-class PhotoDescriber(Closing):
+class FeatureExtraction(Closeable):
     """Reads photos and describes them, several at a time.
 
     Of one photo, SIFT and the global vector's pixel share are computed in two parallel threads,
@@ -43,9 +43,9 @@ class PhotoDescriber(Closing):
         self._global = global_descriptor
         self._num_threads = num_threads
         self._networks = ThreadPoolExecutor(1, "sfm-network")
-        self._streams: WeakSet[Generator[DescribedPhoto | Skipped, None, None]] = WeakSet()
+        self._streams: WeakSet[Generator[ExtractedPhoto | Skipped, None, None]] = WeakSet()
 
-    def describe(self, photo: PhotoPath) -> DescribedPhoto | Skipped:
+    def describe(self, photo: PhotoPath) -> ExtractedPhoto | Skipped:
         """Read one photo and describe it in the calling thread, networks in a second one."""
         clock = Stopwatch()
         with clock.stage("read"):
@@ -60,7 +60,7 @@ class PhotoDescriber(Closing):
             return Skipped(photo.name, SkipReason.NO_FEATURES, "no texture to hold on to")
         with clock.stage("vlad"):
             of_features = self._global.describe_local(features)
-        return DescribedPhoto(
+        return ExtractedPhoto(
             name=read.name,
             path=read.path,
             width=read.width,
@@ -72,9 +72,9 @@ class PhotoDescriber(Closing):
             seconds=clock.seconds,
         )
 
-    def stream(self, photos: Iterable[PhotoPath]) -> Iterator[DescribedPhoto | Skipped]:
+    def stream(self, photos: Iterable[PhotoPath]) -> Iterator[ExtractedPhoto | Skipped]:
         """Describe photos in order, up to twice as many ahead as are worked on at a time."""
-        stream = map_ahead(self.describe, photos, num_threads=self._num_threads)
+        stream = prefetch(self.describe, photos, num_threads=self._num_threads)
         self._streams.add(stream)
         return stream
 

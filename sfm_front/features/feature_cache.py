@@ -36,7 +36,7 @@ _DECISIVE_CODE = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LocalDescription:
+class CachedFeatures:
     """Size of a photo's file, what its camera wrote, and its SIFT features."""
 
     width: int
@@ -46,7 +46,7 @@ class LocalDescription:
 
 
 @dataclass(frozen=True, slots=True)
-class ContentKeys:
+class CacheKeys:
     """Where a photo's description is kept: its features, and a vector for each descriptor."""
 
     features: str
@@ -54,7 +54,7 @@ class ContentKeys:
 
 
 @dataclass(frozen=True, slots=True)
-class DescriptionSettings:
+class ExtractionSettings:
     """All that decides what features and vectors a photo has, apart from its bytes.
 
     ``fingerprints`` are those of the global descriptors.
@@ -65,7 +65,7 @@ class DescriptionSettings:
     max_features: int
     fingerprints: tuple[str, ...]
 
-    def keys(self, digest: str, box: Box | None = None) -> ContentKeys:
+    def keys(self, digest: str, box: Box | None = None) -> CacheKeys:
         """Keys of the photo whose bytes have ``digest``, or of the part in ``box``."""
         # Another release of OpenCV may find other keypoints.
         local = (
@@ -78,23 +78,23 @@ class DescriptionSettings:
             digest,
             box,
         )
-        return ContentKeys(
+        return CacheKeys(
             _key(local), tuple(_key((*local, fingerprint)) for fingerprint in self.fingerprints)
         )
 
 
-class DescriptionFiles:
+class FeatureCache:
     """A folder of descriptions that several sessions, settings and descriptors may share."""
 
     def __init__(self, folder: Path) -> None:
         self._features = ArrayFiles(folder / "features")
         self._vectors = ArrayFiles(folder / "vectors")
 
-    def has(self, keys: ContentKeys) -> bool:
+    def has(self, keys: CacheKeys) -> bool:
         """Whether there are files for features and every vector; they may be damaged."""
         return self._features.has(keys.features) and all(map(self._vectors.has, keys.vectors))
 
-    def load_local(self, key: str) -> LocalDescription | None:
+    def load_local(self, key: str) -> CachedFeatures | None:
         """None where there is none, or the file is damaged."""
         arrays = self._features.load(key)
         try:
@@ -102,7 +102,7 @@ class DescriptionFiles:
         except (KeyError, ValueError, TypeError):
             return None
 
-    def save_local(self, key: str, local: LocalDescription) -> None:
+    def save_local(self, key: str, local: CachedFeatures) -> None:
         features = local.features
         about = {"width": local.width, "height": local.height, "exif": asdict(local.exif)}
         self._features.save(
@@ -121,7 +121,7 @@ class DescriptionFiles:
         vector = None if arrays is None else arrays.get("vector")
         return None if vector is None or vector.dtype != np.float32 else vector
 
-    def load_vectors(self, keys: ContentKeys) -> list[Float32Array] | None:
+    def load_vectors(self, keys: CacheKeys) -> list[Float32Array] | None:
         """Every vector of a photo; None where any of them is not there whole."""
         vectors = [self.load_vector(key) for key in keys.vectors]
         there = [vector for vector in vectors if vector is not None]
@@ -130,7 +130,7 @@ class DescriptionFiles:
     def save_vector(self, key: str, vector: Float32Array) -> None:
         self._vectors.save(key, {"vector": vector})
 
-    def keep_only(self, kept: Iterable[ContentKeys]) -> None:
+    def keep_only(self, kept: Iterable[CacheKeys]) -> None:
         """Remove every other description."""
         kept = list(kept)
         self._features.keep_only({keys.features for keys in kept})
@@ -157,7 +157,7 @@ def _to_json(value: object) -> str:
     raise TypeError(f"{type(value).__name__} is nothing that EXIF holds")
 
 
-def _unpacked(arrays: Arrays) -> LocalDescription:
+def _unpacked(arrays: Arrays) -> CachedFeatures:
     about = json.loads(arrays["about"].tobytes())
     exif = about["exif"]
     if exif["captured_at"] is not None:
@@ -175,7 +175,7 @@ def _unpacked(arrays: Arrays) -> LocalDescription:
     if not len(keypoints) == len(descriptors) == len(colors):
         raise ValueError("keypoints, descriptors and colors differ in number")
     features = Features(keypoints, descriptors, colors)
-    return LocalDescription(about["width"], about["height"], Exif(**exif), features)
+    return CachedFeatures(about["width"], about["height"], Exif(**exif), features)
 
 
 def _checked(array: NDArray[Any], dtype: type, columns: int) -> NDArray[Any]:

@@ -11,19 +11,19 @@ from sfm_front.types import Float32Array, Float64Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Posed:
-    """A photo's camera and pose in the frame of a model."""
+class PosedCamera:
+    """A photo's camera and pose in the world frame."""
 
     camera: pycolmap.Camera
     cam_from_world: pycolmap.Rigid3d
 
     @property
     def center(self) -> Float64Array:
-        """(3,) of projection, in the frame of the model."""
+        """Projection centre, (3,), in world coordinates."""
         return np.asarray(self.cam_from_world.inverse().translation, np.float64)
 
     def rays(self, keypoints: Float32Array) -> Float64Array:
-        """(N, 3) directions of keypoints (N, 4) in the frame of the model, of length 1.
+        """(N, 3) unit directions of keypoints (N, 4) in world coordinates.
 
         nan where undistortion fails.
         """
@@ -33,7 +33,7 @@ class Posed:
         directions: Float64Array = rays @ self.cam_from_world.rotation.matrix()
         return directions
 
-    def relative(self, other: Posed) -> pycolmap.Rigid3d:
+    def relative(self, other: PosedCamera) -> pycolmap.Rigid3d:
         """Pose of the other photo, as seen from this one: cam2_from_cam1, translation as long as
         the baseline."""
         return other.cam_from_world * self.cam_from_world.inverse()

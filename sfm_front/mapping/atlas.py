@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 
-from sfm_front.geometry.posed_camera import Posed
+from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
 from sfm_front.mapping.model import MapperOptions, Model
-from sfm_front.mapping.view_graph import Scene
+from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.types import Float32Array, PairGeometry
 
@@ -46,8 +46,8 @@ class Atlas:
     takes over what did.
     """
 
-    def __init__(self, scene: Scene, options: AtlasOptions | None = None) -> None:
-        self._scene = scene
+    def __init__(self, scene: ViewGraph, options: AtlasOptions | None = None) -> None:
+        self._view_graph = scene
         self._options = options or AtlasOptions()
         self._clock = Stopwatch()
         self._initializer = Initializer(
@@ -65,7 +65,7 @@ class Atlas:
     def waiting(self) -> list[int]:
         """Image ids of the photos that are in no model, in order of arrival."""
         registered = self.registered
-        return [i for i in self._scene.image_ids if i not in registered]
+        return [i for i in self._view_graph.image_ids if i not in registered]
 
     @property
     def num_points(self) -> int:
@@ -74,7 +74,7 @@ class Atlas:
 
     def why_not_registered(self, image_id: int) -> str:
         """What keeps a waiting photo out of the models, in words."""
-        neighbors = self._scene.neighbors(image_id).keys()
+        neighbors = self._view_graph.neighbors(image_id).keys()
         if not neighbors:
             return "no verified matches with any photo"
         if not neighbors & self.registered:
@@ -106,7 +106,7 @@ class Atlas:
 
     def locate(
         self, camera_id: int, keypoints: Float32Array, pairs: Iterable[PairGeometry]
-    ) -> Posed | None:
+    ) -> PosedCamera | None:
         """Pose in the largest model of a photo that is not in the scene yet, by these pairs.
 
         None where they do not tell.
@@ -116,7 +116,7 @@ class Atlas:
         model = self.models[0].reconstruction
         return locate(model, camera_id, keypoints, pairs, self._options.localization)
 
-    def posed(self, image_ids: Iterable[int]) -> dict[int, Posed]:
+    def poses_of(self, image_ids: Iterable[int]) -> dict[int, PosedCamera]:
         """Cameras and poses of those of these photos that are in the largest model."""
         if not self.models:
             return {}
@@ -126,33 +126,33 @@ class Atlas:
 
     def finish(self) -> None:
         """Retry what waits, start afresh where the stream began badly, refine everything."""
-        self._settle()
-        self._start_afresh()
-        self._start_leftovers()
-        self._hold_cameras()
+        self._refine_until_stable()
+        self._restart_largest()
+        self._start_remaining()
+        self._fix_intrinsics()
         self._drop_small()
-        while self._place_without_structure():
-            self._settle()
+        while self._register_structure_less():
+            self._refine_until_stable()
         for model in self.models:
             model.finish()
         self.models = [model for model in self.models if model.num_registered > 1]
-        self._join()
+        self._drop_covered()
 
     def _grow(self) -> bool:
         """Grow every model, the largest first; True if any grew."""
         grew = False
         for model in list(self.models):
             grew |= bool(model.grow(self._candidates(model)))
-        self._join()
+        self._drop_covered()
         return grew
 
     def _candidates(self, model: Model) -> list[int]:
         """Photos that a model may take: the largest those of smaller models, too."""
         if model is self.models[0]:
-            return self._scene.image_ids
+            return self._view_graph.image_ids
         return self.waiting
 
-    def _join(self) -> None:
+    def _drop_covered(self) -> None:
         """Sort models by size and drop those that larger ones hold."""
         self.models.sort(key=lambda model: -model.num_registered)
         covered: set[int] = set()
@@ -163,12 +163,14 @@ class Atlas:
                 kept.append(model)
                 covered |= own
             else:
-                self._events.append(f"model of {model.num_registered} photos joined to a larger")
+                self._events.append(
+                    f"model of {model.num_registered} photos dropped: a larger one holds them all"
+                )
         self.models = kept
 
     def _start_near(self, image_id: int) -> None:
         """Start a model among waiting photos linked to this one, if a pair is good enough."""
-        group = self._scene.component([image_id], among=set(self.waiting))
+        group = self._view_graph.component([image_id], among=set(self.waiting))
         if self.models and len(group) < self._options.min_second_model:
             return
         started = self._initializer.start(group)
@@ -178,7 +180,7 @@ class Atlas:
             self.models.append(model)
             self._grow()
 
-    def _settle(self) -> None:
+    def _refine_until_stable(self) -> None:
         """Refine and grow in turn until nothing more registers."""
         for model in self.models:
             model.forget_failures()
@@ -187,7 +189,7 @@ class Atlas:
                 model.refine()
                 model.forget_failures()
 
-    def _start_afresh(self) -> None:
+    def _restart_largest(self) -> None:
         """Where the largest model misses photos linked to it, grow it anew.
 
         The stream had to take the first pair that would do; the whole graph offers better ones.
@@ -198,18 +200,18 @@ class Atlas:
             largest = self.models[0] if self.models else None
             if largest is not None and not self._misses(largest):
                 return
-            fresh.grow(self._scene.image_ids)
+            fresh.grow(self._view_graph.image_ids)
             if largest is None or fresh.num_registered > largest.num_registered:
                 self._events.append(f"grown afresh: {event}")
                 self.models.insert(0, fresh)
-                self._settle()
+                self._refine_until_stable()
             elif 2 * fresh.num_registered > largest.num_registered:
                 # A start that carried far and still placed no more: another hardly will.
                 failures += 1
                 if failures == self._options.max_failures:
                     return
 
-    def _hold_cameras(self) -> None:
+    def _fix_intrinsics(self) -> None:
         """Grow models anew whose photos do not tell what their camera is, with what EXIF says.
 
         A nadir flight over flat ground leaves focal length and distortion open. On
@@ -218,7 +220,7 @@ class Atlas:
         """
         miscalibrated = [model for model in self.models if model.is_miscalibrated]
         held = replace(self._options.mapper, refine_intrinsics=False)
-        initializer = Initializer(self._scene, self._options.initialization, held, self._clock)
+        initializer = Initializer(self._view_graph, self._options.initialization, held, self._clock)
         for model in miscalibrated:
             best = self._best_start(model.registered, initializer)
             if best is None:
@@ -228,22 +230,22 @@ class Atlas:
                 self._events.append(f"grown afresh, the camera held as EXIF has it: {event}")
                 self.models[self.models.index(model)] = fresh
         if miscalibrated:
-            self._settle()
+            self._refine_until_stable()
 
     def _misses(self, model: Model) -> bool:
         """Whether photos linked to a model are in none, or too many in others."""
-        linked = self._scene.component(model.registered)
+        linked = self._view_graph.component(model.registered)
         if len(linked - self.registered) > self._options.max_missed_share * len(linked):
             return True
         return model.num_registered < self._options.min_share * len(linked)
 
-    def _start_leftovers(self) -> None:
+    def _start_remaining(self) -> None:
         """Further models from photos that are linked to each other and fit nowhere."""
         seen: set[int] = set()
         for image_id in self.waiting:
             if image_id in seen or image_id in self.registered:
                 continue
-            group = self._scene.component([image_id], among=set(self.waiting))
+            group = self._view_graph.component([image_id], among=set(self.waiting))
             seen |= group
             if len(group) < self._options.min_model_size:
                 continue
@@ -252,7 +254,7 @@ class Atlas:
                 model, event = best
                 self._events.append(event)
                 self.models.append(model)
-                self._settle()
+                self._refine_until_stable()
 
     def _best_start(
         self, group: Collection[int], initializer: Initializer
@@ -268,11 +270,11 @@ class Atlas:
                 break
         return best
 
-    def _place_without_structure(self) -> bool:
+    def _register_structure_less(self) -> bool:
         """Register by two-view geometry alone what sees too few points; True if any was."""
         placed: list[int] = []
         for model in self.models:
-            placed += model.grow_without_structure(self._candidates(model))
+            placed += model.register_structure_less(self._candidates(model))
         if placed:
             self._events.append(f"{len(placed)} photos registered without structure")
         return bool(placed)

@@ -19,7 +19,7 @@ _MIN_GAIN = 0.035
 
 
 @dataclass(frozen=True, kw_only=True)
-class PolishOptions:
+class FinalAdjustmentOptions:
     """``loss_scale_px``: reprojection error from which the Cauchy loss gives way.
     ``refine_intrinsics``: whether focal length and distortion may move, and the principal
     point of a camera nothing is known of."""
@@ -29,8 +29,8 @@ class PolishOptions:
     num_threads: int = 2
 
 
-def polish(
-    reconstruction: pycolmap.Reconstruction, options: PolishOptions
+def final_adjustment(
+    reconstruction: pycolmap.Reconstruction, options: FinalAdjustmentOptions
 ) -> pycolmap.Reconstruction:
     """The model after a bundle adjustment with a robust loss; the one given is changed as well.
 
@@ -56,7 +56,7 @@ def polish(
 
 
 def _with_principal_point(
-    reconstruction: pycolmap.Reconstruction, options: PolishOptions
+    reconstruction: pycolmap.Reconstruction, options: FinalAdjustmentOptions
 ) -> pycolmap.Reconstruction:
     """The model adjusted with its principal point where that is better, or the one given."""
     camera_id = _only_camera_id(reconstruction)
@@ -73,7 +73,10 @@ def _with_principal_point(
 
 
 def _adjust(
-    reconstruction: pycolmap.Reconstruction, options: PolishOptions, *, principal_point: bool
+    reconstruction: pycolmap.Reconstruction,
+    options: FinalAdjustmentOptions,
+    *,
+    principal_point: bool,
 ) -> None:
     adjustment = pycolmap.BundleAdjustmentOptions()
     adjustment.print_summary = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pycolmap
 
-from sfm_front.mapping.refinement_schedule import photos_together
+from sfm_front.mapping.refinement_schedule import local_refinement_batch
 
 # A point in more photos than this is left as it is: it hardly moves, and brings all of them in.
 _MAX_TRACK_LENGTH = 15
@@ -27,7 +27,7 @@ class LocalRefinement:
     def add(self, mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
         """Refine around a photo that was just registered and triangulated, at once or later."""
         self._waiting.append(image_id)
-        if len(self._waiting) >= photos_together(mapper.reconstruction.num_reg_images()):
+        if len(self._waiting) >= local_refinement_batch(mapper.reconstruction.num_reg_images()):
             self._refine(mapper)
             self.forget(mapper)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pycolmap
 
 from sfm_front.errors import ConfigError
-from sfm_front.geometry.posed_camera import Posed
+from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.types import Float32Array, Float64Array, PairGeometry, Uint32Array
 
 
@@ -36,12 +36,12 @@ class LocalizationOptions:
             raise ConfigError(f"sample must be at least 1, got {self.sample}")
 
 
-def registered_photo(reconstruction: pycolmap.Reconstruction, image_id: int) -> Posed | None:
+def registered_photo(reconstruction: pycolmap.Reconstruction, image_id: int) -> PosedCamera | None:
     """Camera and pose of a photo of a model; None where it is not in it."""
     image = _registered_image(reconstruction, image_id)
     if image is None:
         return None
-    return Posed(reconstruction.camera(image.camera_id), image.cam_from_world())
+    return PosedCamera(reconstruction.camera(image.camera_id), image.cam_from_world())
 
 
 def _registered_image(
@@ -59,7 +59,7 @@ def locate(
     keypoints: Float32Array,
     pairs: Iterable[PairGeometry],
     options: LocalizationOptions,
-) -> Posed | None:
+) -> PosedCamera | None:
     """Pose of a photo with keypoints (N, 4) by its pairs with photos of a model.
 
     The camera is the model's. None where the model has none, or too few points fit a pose.
@@ -78,7 +78,7 @@ def locate(
         return None
     if found["num_inliers"] < max(options.min_inliers, options.min_share * len(xy)):
         return None
-    return Posed(camera, found["cam_from_world"])
+    return PosedCamera(camera, found["cam_from_world"])
 
 
 def _seen(

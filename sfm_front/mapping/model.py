@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import pycolmap
 
 from sfm_front.errors import ConfigError
-from sfm_front.mapping.final_adjustment import PolishOptions, polish
+from sfm_front.mapping.final_adjustment import FinalAdjustmentOptions, final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.refinement_schedule import LARGE, RefinementSchedule, ScheduleOptions
-from sfm_front.mapping.view_graph import Scene
+from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.runtime.stopwatch import Stopwatch
 
 # Trial counts are kept here, by what a photo sees, not by pycolmap.
@@ -19,7 +19,7 @@ _UNLIMITED_TRIALS = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class InitialPairDemands:
+class InitialPairConstraints:
     """What two photos must show to start a model: see COLMAP's ``init_*`` options.
 
     ``min_points``: a new model with fewer 3-D points is rejected. ``refine_intrinsics``: whether
@@ -94,10 +94,10 @@ class Model:
     """A model that grows photo by photo over a shared scene."""
 
     def __init__(
-        self, scene: Scene, options: MapperOptions, clock: Stopwatch | None = None
+        self, scene: ViewGraph, options: MapperOptions, clock: Stopwatch | None = None
     ) -> None:
         """``clock`` counts global refinements as the stage ``refine``."""
-        self._scene = scene
+        self._view_graph = scene
         self._options = options
         self._clock = clock or Stopwatch()
         self._streaming = options.streaming()
@@ -127,14 +127,16 @@ class Model:
 
     def extend(self, image_id: int) -> None:
         """Let the model know of a photo that has just been added to the scene."""
-        self._scene.extend(self._mapper, self.reconstruction, image_id)
+        self._view_graph.extend(self._mapper, self.reconstruction, image_id)
 
-    def initialize(self, image_id1: int, image_id2: int, demands: InitialPairDemands) -> bool:
-        """Start from a pair. False, and of no further use, if the pair does not carry a model."""
-        self._demand(demands)
+    def initialize(
+        self, image_id1: int, image_id2: int, constraints: InitialPairConstraints
+    ) -> bool:
+        """Start from a pair. False if it yields no model; discard this object then."""
+        self._constrain(constraints)
         # What starts with few points can ask no more of the photos that follow.
         self._mapping.abs_pose_min_num_inliers = min(
-            self._mapping.abs_pose_min_num_inliers, demands.min_points
+            self._mapping.abs_pose_min_num_inliers, constraints.min_points
         )
         cam2_from_cam1 = self._mapper.estimate_initial_two_view_geometry(
             self._mapping, image_id1, image_id2
@@ -146,15 +148,15 @@ class Model:
         )
         for image_id in (image_id1, image_id2):
             self._mapper.triangulate_image(self._triangulation, image_id)
-        if self.num_points < demands.min_points:
+        if self.num_points < constraints.min_points:
             return False
         adjustment = self._options.final(2).get_global_bundle_adjustment()
-        adjustment.refine_focal_length &= demands.refine_intrinsics
-        adjustment.refine_extra_params &= demands.refine_intrinsics
+        adjustment.refine_focal_length &= constraints.refine_intrinsics
+        adjustment.refine_extra_params &= constraints.refine_intrinsics
         self._mapper.adjust_global_bundle(self._mapping, adjustment)
         self.reconstruction.normalize()
         self._mapper.filter_points(self._mapping)
-        if self.num_points < demands.min_points:
+        if self.num_points < constraints.min_points:
             return False
         self._note_refined()
         return True
@@ -175,14 +177,14 @@ class Model:
                     self._refine(self._streaming)
         return placed
 
-    def grow_without_structure(self, photos: Iterable[int]) -> list[int]:
+    def register_structure_less(self, photos: Iterable[int]) -> list[int]:
         """Register photos by their matches to registered ones where no 3-D points are seen.
 
         Those that are in the model are passed over, as in ``grow``.
         """
         placed: list[int] = []
         for image_id in sorted(set(photos) - self.registered):
-            if not self._scene.neighbors(image_id).keys() & self.registered:
+            if not self._view_graph.neighbors(image_id).keys() & self.registered:
                 continue
             if self._mapper.register_next_structure_less_image(self._mapping, image_id):
                 self._mapper.triangulate_image(self._triangulation, image_id)
@@ -190,9 +192,9 @@ class Model:
                 placed.append(image_id)
         return placed
 
-    def find_initial_pair(self, demands: InitialPairDemands) -> tuple[int, int] | None:
+    def find_initial_pair(self, constraints: InitialPairConstraints) -> tuple[int, int] | None:
         """The best pair of the scene by COLMAP's search; each call gives another, or None."""
-        self._demand(demands)
+        self._constrain(constraints)
         found = self._mapper.find_initial_image_pair(self._mapping, -1, -1)
         return None if found is None else found[0]
 
@@ -203,9 +205,9 @@ class Model:
     def finish(self) -> None:
         """Refine a last time. The model cannot grow any more after this."""
         self.refine()
-        self.reconstruction = polish(
+        self.reconstruction = final_adjustment(
             self.reconstruction,
-            PolishOptions(
+            FinalAdjustmentOptions(
                 refine_intrinsics=self._options.refine_intrinsics,
                 num_threads=self._options.num_threads,
             ),
@@ -236,10 +238,10 @@ class Model:
             )
         ]
 
-    def _demand(self, demands: InitialPairDemands) -> None:
-        self._mapping.init_min_tri_angle = demands.min_angle_deg
-        self._mapping.init_min_num_inliers = demands.min_inliers
-        self._mapping.init_max_forward_motion = demands.max_forward_motion
+    def _constrain(self, constraints: InitialPairConstraints) -> None:
+        self._mapping.init_min_tri_angle = constraints.min_angle_deg
+        self._mapping.init_min_num_inliers = constraints.min_inliers
+        self._mapping.init_max_forward_motion = constraints.max_forward_motion
 
     def _best(self, waiting: Iterable[int]) -> int | None:
         """The waiting photo with the best spread of visible points, if one is worth a trial."""

@@ -11,7 +11,7 @@ from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
 from sfm_front.types import Float32Array, PairGeometry
 
 
-class Scene:
+class ViewGraph:
     """The photos and verified pairs that every model is grown over.
 
     A photo's image, frame and (for its camera) rig ids are equal to the image and camera ids it

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sfm_front.geometry.angles import FULL_TURN, wrapped
-from sfm_front.matching.match_mask import Block, Meetings
+from sfm_front.matching.match_mask import MaskBlock, MatchMask
 from sfm_front.types import Float64Array, Uint32Array
 
 _ROWS = 128
@@ -44,7 +44,7 @@ class EpipolarPlanes:
         distances: Float64Array = self._sine2[matches[:, 1]] * np.abs(wrapped(apart))
         return np.nan_to_num(distances, nan=np.inf)
 
-    def meetings(self, band_rad: float) -> Meetings:
+    def mask(self, band_rad: float) -> MatchMask:
         """Each feature of the first photo meets those of the second this near to its plane."""
         order1, order2 = _in_order(self._angle1, self._sine1), _in_order(self._angle2, self._sine2)
         angle, reach = self._angle2[order2], band_rad / self._sine2[order2]
@@ -54,7 +54,9 @@ class EpipolarPlanes:
         angle = np.concatenate([angle, angle[below] + FULL_TURN, angle[above] - FULL_TURN])
         reach = np.concatenate([reach, reach[below], reach[above]])
         order2 = np.concatenate([order2, order2[below], order2[above]])
-        return Meetings(order1, order2, _blocks(self._angle1[order1], angle - reach, angle + reach))
+        return MatchMask(
+            order1, order2, _blocks(self._angle1[order1], angle - reach, angle + reach)
+        )
 
 
 def _across(axis: Float64Array, ahead: Float64Array) -> Float64Array:
@@ -77,11 +79,11 @@ def _in_order(angle: Float64Array, sine: Float64Array) -> np.ndarray:
     return known[np.argsort(angle[known], kind="stable")]
 
 
-def _blocks(angle: Float64Array, low: Float64Array, high: Float64Array) -> Iterator[Block]:
+def _blocks(angle: Float64Array, low: Float64Array, high: Float64Array) -> Iterator[MaskBlock]:
     """Rising angles (N,) against what reaches from low to high (M,), some rows at a time."""
     row, first, last = (array.astype(np.float32) for array in (angle, low, high))
     for start in range(0, len(row), _ROWS):
         rows = slice(start, min(start + _ROWS, len(row)))
         columns = np.flatnonzero((first <= row[rows.stop - 1]) & (last >= row[rows.start]))
         own = row[rows, None]
-        yield Block(rows, columns, (first[columns] <= own) & (own <= last[columns]))
+        yield MaskBlock(rows, columns, (first[columns] <= own) & (own <= last[columns]))

@@ -9,12 +9,12 @@ import numpy as np
 import pycolmap
 
 from sfm_front.errors import ConfigError
-from sfm_front.geometry.posed_camera import Posed
+from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.matching.epipolar import EpipolarPlanes
-from sfm_front.matching.in_plane_rotation import turned_alike
-from sfm_front.matching.nearest_neighbors import MatchingOptions, match_meeting
+from sfm_front.matching.in_plane_rotation import agrees_with_rotation
+from sfm_front.matching.nearest_neighbors import MatchingOptions, match_masked
 from sfm_front.matching.verification import VerificationOptions, View
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.types import Candidate, Float64Array, PairGeometry, Uint32Array
 
 _CALIBRATED = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
@@ -41,7 +41,7 @@ class GuidedOptions:
             )
 
 
-class GuidedPairing:
+class GuidedMatcher:
     """Takes the two-view geometry from the poses in the model, and matches accordingly.
 
     That only holds where the poses are right: the matches that re-ranking found, without knowing
@@ -53,7 +53,7 @@ class GuidedPairing:
         options: GuidedOptions,
         matching: MatchingOptions,
         verification: VerificationOptions,
-        workers: Workers,
+        workers: WorkerPool,
     ) -> None:
         self._options = options
         self._matching = replace(matching, max_ratio=options.max_ratio)
@@ -64,10 +64,10 @@ class GuidedPairing:
     def match(
         self,
         query: View,
-        posed: Posed,
+        posed: PosedCamera,
         candidates: Sequence[Candidate],
         views: Mapping[int, View],
-        posed_others: Mapping[int, Posed],
+        posed_others: Mapping[int, PosedCamera],
     ) -> list[PairGeometry]:
         """Pairs of the query, posed so, with those candidates whose poses are known and agree."""
         first = _side(query, posed)
@@ -85,7 +85,7 @@ class GuidedPairing:
     def _pair(
         self, first: _Side, second: _Side, candidate: Candidate, evidence: Uint32Array
     ) -> PairGeometry | None:
-        """None where the evidence does not bear the poses out, or too little matches."""
+        """None if the re-ranking inliers contradict the poses or too few features match."""
         baseline = second.posed.center - first.posed.center
         if not baseline.any():
             return None
@@ -95,13 +95,13 @@ class GuidedPairing:
         if agreeing < max(self._min_inliers, self._options.min_agreeing * len(evidence)):
             return None
         features1, features2 = first.view.features, second.view.features
-        matches = match_meeting(
-            features1.descriptors, features2.descriptors, planes.meetings(band_rad), self._matching
+        matches = match_masked(
+            features1.descriptors, features2.descriptors, planes.mask(band_rad), self._matching
         )
-        if candidate.turn_rad is not None:
+        if candidate.rotation_rad is not None:
             keypoints1 = features1.keypoints[matches[:, 0]]
             keypoints2 = features2.keypoints[matches[:, 1]]
-            matches = matches[turned_alike(keypoints1, keypoints2, candidate.turn_rad)]
+            matches = matches[agrees_with_rotation(keypoints1, keypoints2, candidate.rotation_rad)]
         if len(matches) < self._min_inliers:
             return None
         geometry = two_view_geometry(first.posed, second.posed)
@@ -114,18 +114,18 @@ class GuidedPairing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Side:
-    """One side of a pair; ``rays`` (N, 3): see ``Posed.rays``."""
+    """One side of a pair; ``rays`` (N, 3): see ``PosedCamera.rays``."""
 
     view: View
-    posed: Posed
+    posed: PosedCamera
     rays: Float64Array
 
 
-def _side(view: View, posed: Posed) -> _Side:
+def _side(view: View, posed: PosedCamera) -> _Side:
     return _Side(view, posed, posed.rays(view.features.keypoints))
 
 
-def two_view_geometry(posed1: Posed, posed2: Posed) -> pycolmap.TwoViewGeometry:
+def two_view_geometry(posed1: PosedCamera, posed2: PosedCamera) -> pycolmap.TwoViewGeometry:
     """As COLMAP has it for calibrated photos: the relative pose with a translation of length 1."""
     geometry = pycolmap.TwoViewGeometry()
     geometry.config = _CALIBRATED

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sfm_front.geometry.angles import FULL_TURN, wrapped
-from sfm_front.matching.match_mask import Block, Meetings
+from sfm_front.matching.match_mask import MaskBlock, MatchMask
 from sfm_front.types import Float32Array
 
 # Of the verified matches of nine scenes, 87 to 99 % are turned within this of the pair's common
@@ -21,7 +21,7 @@ _MIN_AGREEING = 0.75
 NUM_SECTORS = 24
 
 
-def common_turn(keypoints1: Float32Array, keypoints2: Float32Array) -> float | None:
+def in_plane_rotation(keypoints1: Float32Array, keypoints2: Float32Array) -> float | None:
     """The angle, in radians, by which matching keypoints (M, 4) turn from photo 1 to photo 2.
 
     None where the matches are too few to tell, or do not agree.
@@ -35,48 +35,52 @@ def common_turn(keypoints1: Float32Array, keypoints2: Float32Array) -> float | N
     return common if agreeing.mean() >= _MIN_AGREEING else None
 
 
-def turned_alike(
-    keypoints1: Float32Array, keypoints2: Float32Array, turn_rad: float
+def agrees_with_rotation(
+    keypoints1: Float32Array, keypoints2: Float32Array, rotation_rad: float
 ) -> NDArray[np.bool_]:
     """(M,) whether matching keypoints (M, 4) turn by so much, 30 degrees more or less."""
-    alike: NDArray[np.bool_] = _apart_rad(keypoints1, keypoints2, turn_rad) < _MATCH_TOLERANCE_RAD
+    alike: NDArray[np.bool_] = (
+        _apart_rad(keypoints1, keypoints2, rotation_rad) < _MATCH_TOLERANCE_RAD
+    )
     return alike
 
 
 def _apart_rad(
-    keypoints1: Float32Array, keypoints2: Float32Array, turn_rad: float
+    keypoints1: Float32Array, keypoints2: Float32Array, rotation_rad: float
 ) -> NDArray[np.floating[Any]]:
     """(M,) how far matching keypoints (M, 4) are from turning by so much."""
     apart: NDArray[np.floating[Any]] = np.abs(
-        wrapped(keypoints2[:, 3] - keypoints1[:, 3] - turn_rad)
+        wrapped(keypoints2[:, 3] - keypoints1[:, 3] - rotation_rad)
     )
     return apart
 
 
-def sectors(orientations1: Float32Array, orientations2: Float32Array, turn_rad: float) -> Meetings:
+def rotation_mask(
+    orientations1: Float32Array, orientations2: Float32Array, rotation_rad: float
+) -> MatchMask:
     """Features (N,) and (M,) that may match where photo 2 is turned by this against photo 1.
 
     Each feature of photo 1 meets those of photo 2 within 20 degrees of where the turn takes it,
     and some up to 35 degrees away. A sixth of all pairs meets where orientations are spread.
     """
-    expected = np.mod(orientations1 + turn_rad, FULL_TURN)
+    expected = np.mod(orientations1 + rotation_rad, FULL_TURN)
     found = np.mod(orientations2, FULL_TURN)
     order1, order2 = np.argsort(expected, kind="stable"), np.argsort(found, kind="stable")
     found = found[order2]
     below, above = np.searchsorted(found, (TOLERANCE_RAD, FULL_TURN - TOLERANCE_RAD))
     circle = np.concatenate([found[above:] - FULL_TURN, found, found[:below] + FULL_TURN])
-    return Meetings(
+    return MatchMask(
         order1,
         np.concatenate([order2[above:], order2, order2[:below]]),
         _blocks(expected[order1], circle),
     )
 
 
-def _blocks(expected: Float32Array, found: Float32Array) -> Iterator[Block]:
+def _blocks(expected: Float32Array, found: Float32Array) -> Iterator[MaskBlock]:
     edges = np.linspace(0, FULL_TURN, NUM_SECTORS + 1)
     rows = np.searchsorted(expected, edges)
     rows[-1] = len(expected)
     first = np.searchsorted(found, edges[:-1] - TOLERANCE_RAD)
     last = np.searchsorted(found, edges[1:] + TOLERANCE_RAD)
     for sector in range(NUM_SECTORS):
-        yield Block(slice(rows[sector], rows[sector + 1]), slice(first[sector], last[sector]))
+        yield MaskBlock(slice(rows[sector], rows[sector + 1]), slice(first[sector], last[sector]))

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Block(NamedTuple):
+class MaskBlock(NamedTuple):
     """Rows of the first order against columns of the second; ``meet`` (rows, columns): which of
     these do, None where all do."""
 
     rows: slice
     columns: slice | NDArray[np.intp]
-    meet: NDArray[np.bool_] | None = None
+    allowed: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Meetings:
+class MatchMask:
     """Features in such an order that those to be compared lie in blocks.
 
     ``order1`` (N,): indices of features of the first photo, each at most once. ``order2`` (M',):
@@ -29,4 +29,4 @@ class Meetings:
 
     order1: NDArray[np.intp]
     order2: NDArray[np.intp]
-    blocks: Iterable[Block]
+    blocks: Iterable[MaskBlock]

@@ -21,7 +21,7 @@ _SECTOR_RAD = 2 * math.pi / NUM_SECTORS
 
 
 class TorchMatcher:
-    """Finds what ``matching.match`` and ``matching.match_turned`` find.
+    """Finds what ``match_descriptors`` and ``match_rotated`` find.
 
     Similarities are whole numbers below 2^24, which float32 products give exactly; torch leaves
     TensorFloat-32, which would not, off for matrix products unless told otherwise.
@@ -35,7 +35,7 @@ class TorchMatcher:
         self,
         query: Features,
         others: Sequence[Features],
-        turns_rad: Sequence[float | None],
+        rotations_rad: Sequence[float | None],
     ) -> list[Uint32Array]:
         """See ``matcher.Matcher``."""
         if len(query) < 2:
@@ -45,16 +45,16 @@ class TorchMatcher:
         found: list[Uint32Array] = []
         for start in range(0, len(others), at_once):
             chosen = slice(start, start + at_once)
-            found += self._match_batch(query, others[chosen], turns_rad[chosen])
+            found += self._match_batch(query, others[chosen], rotations_rad[chosen])
         return found
 
     def _match_batch(
-        self, query: Features, others: Sequence[Features], turns_rad: Sequence[float | None]
+        self, query: Features, others: Sequence[Features], rotations_rad: Sequence[float | None]
     ) -> list[Uint32Array]:
         import torch
 
         with torch.inference_mode():
-            similarity = self._similarities(query, others, turns_rad)
+            similarity = self._similarities(query, others, rotations_rad)
             two, nearest_two = similarity.topk(2, dim=2)
             best, runner_up = two.unbind(dim=2)
             nearest = nearest_two[:, :, 0]
@@ -71,7 +71,7 @@ class TorchMatcher:
             ]
 
     def _similarities(
-        self, query: Features, others: Sequence[Features], turns_rad: Sequence[float | None]
+        self, query: Features, others: Sequence[Features], rotations_rad: Sequence[float | None]
     ) -> torch.Tensor:
         """(pairs, N, M) float32; -1 where two features do not meet, or there is none."""
         import torch
@@ -84,17 +84,17 @@ class TorchMatcher:
             exists[pair, 0, : len(other)] = True
         similarity = self._send(query.descriptors).float() @ descriptors.transpose(1, 2)
         similarity.masked_fill_(~exists, -1)
-        for pair, turn_rad in enumerate(turns_rad):
-            if turn_rad is not None and len(others[pair]) > 0:
-                meets = self._meets(query, others[pair], turn_rad)
+        for pair, rotation_rad in enumerate(rotations_rad):
+            if rotation_rad is not None and len(others[pair]) > 0:
+                meets = self._meets(query, others[pair], rotation_rad)
                 similarity[pair, :, : len(others[pair])].masked_fill_(~meets, -1)
         return similarity
 
-    def _meets(self, query: Features, other: Features, turn_rad: float) -> torch.Tensor:
-        """(N, M) bool: as ``orientation.sectors`` has it."""
+    def _meets(self, query: Features, other: Features, rotation_rad: float) -> torch.Tensor:
+        """(N, M) bool: as ``orientation.rotation_mask`` has it."""
         import torch
 
-        expected = torch.remainder(self._send(query.keypoints[:, 3]) + turn_rad, 2 * math.pi)
+        expected = torch.remainder(self._send(query.keypoints[:, 3]) + rotation_rad, 2 * math.pi)
         middle = (torch.floor(expected / _SECTOR_RAD) + 0.5) * _SECTOR_RAD
         apart = middle[:, None] - self._send(other.keypoints[:, 3])[None]
         apart = torch.remainder(apart + math.pi, 2 * math.pi) - math.pi

@@ -83,7 +83,7 @@ class Verifier:
         return matches[self._gate(view1, view2, matches)]
 
     def count_inliers(self, view1: View, view2: View, matches: Uint32Array) -> int:
-        """How many these are."""
+        """Number of inliers."""
         return len(self.inliers(view1, view2, matches))
 
     def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | Rejection:

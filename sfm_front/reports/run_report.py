@@ -13,12 +13,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from sfm_front.runtime.closeable import Closing
+from sfm_front.runtime.closeable import Closeable
 from sfm_front.storage.json_files import write_json
-from sfm_front.types import STAGES_AHEAD, ModelSummary, StepReport
+from sfm_front.types import PREFETCHED_STAGES, ModelSummary, StepReport
 
 
-class Report(Closing):
+class Report(Closeable):
     """Collects what became of each photo and writes it down."""
 
     def __init__(self, output: Path) -> None:
@@ -143,7 +143,7 @@ class Report(Closing):
         It should not grow once there are as many photos as candidates. What runs ahead is left
         out: beside a growing model it waits longer for the processor.
         """
-        left_out = STAGES_AHEAD | {"refine"}
+        left_out = PREFETCHED_STAGES | {"refine"}
         work = [
             sum(seconds for stage, seconds in step.seconds.items() if stage not in left_out)
             for step in self._steps

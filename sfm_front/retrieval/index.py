@@ -24,7 +24,7 @@ SHORTLIST = 192
 
 # Photos that a widened query orders anew. All of the shortlist take longer and give the same: of
 # 5063, 0.9334 of the relevant photos were among the first 25, and 0.9338 with 256.
-_WIDENED = 100
+_EXPANDED = 100
 
 # A vector is rotated as a matrix of this many columns, and this many rows come out.
 _COLUMNS = 128
@@ -71,24 +71,24 @@ class CosineIndex:
         vector: Float32Array,
         count: int,
         *,
-        widen_by: int = 0,
-        widen_with: Iterable[int] = (),
+        num_expansion: int = 0,
+        expand_with: Iterable[int] = (),
     ) -> list[Candidate]:
         """The ``count`` photos nearest to the (dimension,) vector with their cosines, best first;
         of equals the one added earlier.
 
-        ``widen_by``: so many of the best, each times its cosine, are added to the vector, and
-        ``widen_with``: so are these photos. The best 100 or, if that is more, twice as many as are
+        ``num_expansion``: so many of the best, each times its cosine, are added to the vector, and
+        ``expand_with``: so are these photos. The best 100 or, if that is more, twice as many as are
         asked for are ordered by what that gives; their cosines remain those with the vector.
         """
         rows = self._shortlist(vector, max(SHORTLIST, 4 * count))
         cosines = scores = self._cosines(vector, rows)
-        best = (int(rows[i]) for i in _best(cosines, widen_by))
-        companions = {*best, *(self._rows[image_id] for image_id in widen_with)}
+        best = (int(rows[i]) for i in _best(cosines, num_expansion))
+        companions = {*best, *(self._rows[image_id] for image_id in expand_with)}
         if companions:
-            near = np.sort(_best(cosines, max(_WIDENED, 2 * count)))
+            near = np.sort(_best(cosines, max(_EXPANDED, 2 * count)))
             rows, cosines = rows[near], cosines[near]
-            scores = self._cosines(self._widened(vector, sorted(companions)), rows)
+            scores = self._cosines(self._expanded(vector, sorted(companions)), rows)
         return [
             # Rounding may take the cosine of a vector with itself above 1.
             Candidate(self._image_ids[rows[i]], min(1.0, float(cosines[i])))
@@ -113,7 +113,7 @@ class CosineIndex:
         cosines: Float32Array = products[0][np.argsort(found[0])] * peaks
         return cosines
 
-    def _widened(self, vector: Float32Array, rows: Iterable[int]) -> Float32Array:
+    def _expanded(self, vector: Float32Array, rows: Iterable[int]) -> Float32Array:
         wider = vector.copy()
         for row in rows:
             other = np.asarray(self._vectors.reconstruct(row)) * self._peaks[row]

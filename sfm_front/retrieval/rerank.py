@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sfm_front.errors import ConfigError
-from sfm_front.matching.in_plane_rotation import common_turn
+from sfm_front.matching.in_plane_rotation import in_plane_rotation
 from sfm_front.matching.matcher import Matcher
 from sfm_front.matching.verification import Verifier, View
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.types import Candidate, Uint32Array
 
 _AT_ONCE = 12
@@ -31,7 +31,7 @@ class Reranker:
     """Counts verified matches between a query and each of its candidates."""
 
     def __init__(
-        self, options: RerankOptions, matcher: Matcher, verifier: Verifier, workers: Workers
+        self, options: RerankOptions, matcher: Matcher, verifier: Verifier, workers: WorkerPool
     ) -> None:
         self._options = options
         self._matcher = matcher
@@ -77,9 +77,11 @@ class Reranker:
             candidate, tentative_matches = tentative
             view = views[candidate.image_id]
             inliers = self._verifier.inliers(query, view, tentative_matches)
-            turn_rad = common_turn(
+            rotation_rad = in_plane_rotation(
                 query.features.keypoints[inliers[:, 0]], view.features.keypoints[inliers[:, 1]]
             )
-            return replace(candidate, inliers=len(inliers), turn_rad=turn_rad, matches=inliers)
+            return replace(
+                candidate, inliers=len(inliers), rotation_rad=rotation_rad, matches=inliers
+            )
 
         return self._workers.map(verify, zip(candidates, matches, strict=True))

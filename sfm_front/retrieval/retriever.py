@@ -18,17 +18,17 @@ from sfm_front.types import Candidate, Float32Array
 
 @dataclass(frozen=True, kw_only=True)
 class RetrievalOptions:
-    """``candidates``: photos that the global vectors propose. ``widen_by``: so many of the best
-    are added to the query before, see ``CosineIndex.query``."""
+    """``candidates``: photos that the global vectors propose. ``num_expansion``: number of top
+    results used for query expansion, see ``CosineIndex.query``."""
 
     candidates: int = 25
-    widen_by: int = 5
+    num_expansion: int = 5
 
     def __post_init__(self) -> None:
         if self.candidates < 1:
             raise ConfigError(f"candidates must be at least 1, got {self.candidates}")
-        if self.widen_by < 0:
-            raise ConfigError(f"widen_by must not be negative, got {self.widen_by}")
+        if self.num_expansion < 0:
+            raise ConfigError(f"num_expansion must not be negative, got {self.num_expansion}")
 
 
 class Retriever:
@@ -48,7 +48,7 @@ class Retriever:
     def candidates(self, vector: Float32Array) -> list[Candidate]:
         """The coarse step: photos by a (dimension,) global vector and its best, best first."""
         options = self._options
-        return self._index.query(vector, options.candidates, widen_by=options.widen_by)
+        return self._index.query(vector, options.candidates, num_expansion=options.num_expansion)
 
     def rank(
         self, vector: Float32Array, reranked: Sequence[Candidate], *, min_inliers: int
@@ -63,8 +63,8 @@ class Retriever:
         others = self._index.query(
             vector,
             len(self),
-            widen_by=0 if verified else self._options.widen_by,
-            widen_with=first,
+            num_expansion=0 if verified else self._options.num_expansion,
+            expand_with=first,
         )
         known = {candidate.image_id: candidate for candidate in reranked}
         return verified + [known.get(c.image_id, c) for c in others if c.image_id not in first]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TypeVar
 
-T = TypeVar("T", bound="Closing")
+T = TypeVar("T", bound="Closeable")
 
 
-class Closing(ABC):
+class Closeable(ABC):
     """``with`` gives the object itself and closes it at the end, whatever happened."""
 
     @abstractmethod

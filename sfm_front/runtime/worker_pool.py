@@ -9,13 +9,13 @@ from typing import ClassVar, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from sfm_front.runtime.closeable import Closing
+from sfm_front.runtime.closeable import Closeable
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-class Workers(Closing):
+class WorkerPool(Closeable):
     """Maps a function over items on ``num_threads`` threads; results come in the items' order.
 
     While it is open, matrix products and two-view estimates run on the thread that asks for them:
@@ -38,7 +38,7 @@ class Workers(Closing):
         with self._lock:
             # Again for each: libraries may have been loaded since the last.
             self._limits.append(threadpool_limits(1))
-            Workers._num_open += 1
+            WorkerPool._num_open += 1
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
         if self._pool is None:
@@ -52,6 +52,6 @@ class Workers(Closing):
             if self._closed:
                 return
             self._closed = True
-            Workers._num_open -= 1
-            while Workers._num_open == 0 and self._limits:
+            WorkerPool._num_open -= 1
+            while WorkerPool._num_open == 0 and self._limits:
                 self._limits.pop().restore_original_limits()

@@ -9,15 +9,15 @@ from typing import Literal, get_args
 
 from sfm_front.errors import ConfigError
 from sfm_front.matching.matcher import make_matcher
-from sfm_front.matching.nearest_neighbors import NO_MATCHES, MatchingOptions, match
+from sfm_front.matching.nearest_neighbors import NO_MATCHES, MatchingOptions, match_descriptors
 from sfm_front.matching.verification import Verifier
 from sfm_front.photos.source import PhotoPath
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.runtime.stopwatch import Stopwatch
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.search.photo_index import PhotoIndex, view_of
-from sfm_front.types import Candidate, DescribedPhoto, Float64Array, PairGeometry
+from sfm_front.types import Candidate, ExtractedPhoto, Float64Array, PairGeometry
 
 SearchMethod = Literal["ours", "exhaustive", "cosine"]
 
@@ -83,7 +83,7 @@ class FolderSearch:
     """Answers queries from an index that is up to date."""
 
     def __init__(
-        self, index: PhotoIndex, options: SearchOptions, workers: Workers, *, device: str = "cpu"
+        self, index: PhotoIndex, options: SearchOptions, workers: WorkerPool, *, device: str = "cpu"
     ) -> None:
         """``device``: one that ``devices.usable_device`` has given, for matching."""
         self._index = index
@@ -101,7 +101,7 @@ class FolderSearch:
             self._retriever.remember(image_id, vector)
         self._ids = {photo.path.resolve(): image_id for image_id, photo in index.photos.items()}
 
-    def ask(self, query: DescribedPhoto) -> Answer:
+    def ask(self, query: ExtractedPhoto) -> Answer:
         """Rank the folder's photos. The query, where it is one of them, is not in the answer."""
         clock = Stopwatch()
         query_id = self._ids.get(query.path.resolve(), _NOT_INDEXED)
@@ -123,17 +123,19 @@ class FolderSearch:
         )
         return Answer(PhotoPath(query.name, query.path), found, clock.seconds)
 
-    def _proposed(self, query: DescribedPhoto, query_id: int) -> list[Candidate]:
+    def _proposed(self, query: ExtractedPhoto, query_id: int) -> list[Candidate]:
         """The photos to be re-ranked: never the query's own."""
         if self._options.method == "cosine":
             return []
         found = self._retriever.candidates(query.global_vector)
         return [c for c in found if c.image_id != query_id][: self._num_candidates]
 
-    def verified_matches(self, query: DescribedPhoto, other: DescribedPhoto) -> VerifiedMatches:
+    def verified_matches(self, query: ExtractedPhoto, other: ExtractedPhoto) -> VerifiedMatches:
         """Match two photos on all features, and verify; no match is left if they are rejected."""
         view1, view2 = view_of(1, query), view_of(2, other)
-        matches = match(view1.features.descriptors, view2.features.descriptors, self._matching)
+        matches = match_descriptors(
+            view1.features.descriptors, view2.features.descriptors, self._matching
+        )
         pair = self._verifier.verify(view1, view2, matches)
         inliers = NO_MATCHES
         if isinstance(pair, PairGeometry):
@@ -152,7 +154,7 @@ class FolderSearch:
     def _retrieval_options(self) -> RetrievalOptions:
         # One more: the query may be among them.
         options = replace(self._options.retrieval, candidates=self._num_candidates + 1)
-        return replace(options, widen_by=0) if self._options.method == "cosine" else options
+        return replace(options, num_expansion=0) if self._options.method == "cosine" else options
 
     def _rerank_options(self) -> RerankOptions:
         if self._options.method == "exhaustive":

@@ -8,7 +8,7 @@ from pathlib import Path
 from sfm_front.errors import InputError
 
 
-class Relevance:
+class GroundTruth:
     """Names that are relevant to any query, and pairs of names that are to each other."""
 
     def __init__(self, names: Collection[str], pairs: Collection[tuple[str, str]]) -> None:
@@ -22,7 +22,7 @@ class Relevance:
         return known - {query} if known else None
 
 
-def read_relevance(file: Path, photos: Collection[str]) -> Relevance:
+def read_ground_truth(file: Path, photos: Collection[str]) -> GroundTruth:
     """Read names of relevant photos, one a line, or pairs as lines ``a b n`` (n shared points).
 
     ``photos``: all names there are. Empty lines and those that begin with # are passed over.
@@ -50,4 +50,4 @@ def read_relevance(file: Path, photos: Collection[str]) -> Relevance:
             f"{file}: names none of the {len(known)} photos. Give names below the folder, one a "
             "line, or lines of two names and the number of points they share."
         )
-    return Relevance(names, pairs)
+    return GroundTruth(names, pairs)

@@ -10,13 +10,13 @@ from typing import Any
 
 from sfm_front.cli.progress import CountLine
 from sfm_front.errors import InputError
-from sfm_front.features.cached_extraction import CachedDescriber, Recalled
-from sfm_front.features.feature_cache import ContentKeys
+from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto
+from sfm_front.features.feature_cache import CacheKeys
 from sfm_front.matching.verification import View
 from sfm_front.photos.cameras import CameraCatalog, CameraOptions
 from sfm_front.photos.source import PhotoPath
 from sfm_front.storage.json_files import write_json
-from sfm_front.types import DescribedPhoto, Float32Array, Skipped, SkipReason
+from sfm_front.types import ExtractedPhoto, Float32Array, Skipped, SkipReason
 
 _FORMAT = 1
 _FILE = "index.json"
@@ -65,7 +65,7 @@ class PhotoIndex(Mapping[int, View]):
     A view is read from disk when it is asked for: a query looks at few of them.
     """
 
-    def __init__(self, folder: Path, describer: CachedDescriber) -> None:
+    def __init__(self, folder: Path, describer: CachedExtraction) -> None:
         """``folder``: where the index is, or is to be; ``describer`` keeps its files there too."""
         self._file = folder / _FILE
         self._describer = describer
@@ -98,7 +98,7 @@ class PhotoIndex(Mapping[int, View]):
         described = self._describer.stream(missing, num_threads=num_threads)
         for photo, result in zip(missing, described, strict=True):
             now[photo.name] = _completed(now[photo.name], result)
-            num_described += isinstance(result, Recalled)
+            num_described += isinstance(result, CachedPhoto)
             line.count()
         line.end()
         self._save(now)
@@ -122,7 +122,7 @@ class PhotoIndex(Mapping[int, View]):
         vectors = self._describer.files.load_vectors(self._keys(self._digests[image_id]))
         return vectors[0] if vectors else self.described(image_id).photo.global_vector
 
-    def described(self, image_id: int) -> Recalled:
+    def described(self, image_id: int) -> CachedPhoto:
         """The photo with everything known of it.
 
         Raises InputError if it has been made unusable since ``update``.
@@ -142,7 +142,7 @@ class PhotoIndex(Mapping[int, View]):
     def __len__(self) -> int:
         return len(self.photos)
 
-    def _keys(self, digest: str) -> ContentKeys:
+    def _keys(self, digest: str) -> CacheKeys:
         return self._describer.settings.keys(digest)
 
     def _is_complete(self, entry: _Entry) -> bool:
@@ -180,7 +180,7 @@ class PhotoIndex(Mapping[int, View]):
         return json.loads(json.dumps(asdict(self._describer.settings)))
 
 
-def view_of(image_id: int, photo: DescribedPhoto) -> View:
+def view_of(image_id: int, photo: ExtractedPhoto) -> View:
     """A described photo as one side of a pair, with a camera of its own."""
     catalog = CameraCatalog(CameraOptions(mode="per-image"))
     return View(image_id, catalog.camera_for(photo).camera, photo.features)
@@ -195,7 +195,7 @@ def _entry(photo: PhotoPath) -> _Entry:
     return _Entry(path, status.st_size, status.st_mtime_ns)
 
 
-def _completed(entry: _Entry, result: Recalled | Skipped) -> _Entry:
+def _completed(entry: _Entry, result: CachedPhoto | Skipped) -> _Entry:
     if isinstance(result, Skipped):
         reason = result.reason.value, result.detail
         return _Entry(entry.path, entry.size, entry.mtime_ns, skipped=reason)

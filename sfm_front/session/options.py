@@ -31,10 +31,10 @@ class SessionOptions:
     keypoints a photo. ``global_descriptor``: a name that ``features.global_descriptor.resolve``
     knows; ``weights``: a file for its network; ``device``: ``auto``, ``cpu`` or
     ``cuda``, of the network and of matching. ``rerank``: the look that ranks candidates;
-    ``second_look``: at those of which it told too little.
-    ``matched``: re-ranked photos that are matched on all features; ``unguided``: so many of them,
-    the best, come first, and where they tell the pose it guides the others. ``threads``: cores to
-    use.
+    ``second_rerank``: at those of which it told too little.
+    ``num_matched``: re-ranked photos that are matched on all features. ``num_matched_first``:
+    number of top candidates matched without guidance; the pose they yield guides the rest.
+    ``threads``: cores to use.
     ``text``: write models in COLMAP's text form too.
     """
 
@@ -43,24 +43,24 @@ class SessionOptions:
     global_descriptor: str = "auto"
     weights: Path | None = None
     device: str = "auto"
-    matched: int = 8
-    unguided: int = 3
+    num_matched: int = 8
+    num_matched_first: int = 3
     text: bool = False
     threads: int = field(default_factory=available_cores)
     cameras: CameraOptions = field(default_factory=CameraOptions)
     retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
     rerank: RerankOptions = field(default_factory=RerankOptions)
-    second_look: RerankOptions = field(default_factory=lambda: RerankOptions(max_features=2000))
+    second_rerank: RerankOptions = field(default_factory=lambda: RerankOptions(max_features=2000))
     matching: MatchingOptions = field(default_factory=MatchingOptions)
     guided: GuidedOptions = field(default_factory=GuidedOptions)
     verification: VerificationOptions = field(default_factory=VerificationOptions)
     atlas: AtlasOptions = field(default_factory=AtlasOptions)
 
     def __post_init__(self) -> None:
-        if self.matched < 1:
-            raise ConfigError(f"matched must be at least 1, got {self.matched}")
-        if self.unguided < 1:
-            raise ConfigError(f"unguided must be at least 1, got {self.unguided}")
+        if self.num_matched < 1:
+            raise ConfigError(f"num_matched must be at least 1, got {self.num_matched}")
+        if self.num_matched_first < 1:
+            raise ConfigError(f"num_matched_first must be at least 1, got {self.num_matched_first}")
         if self.threads < 1:
             raise ConfigError(f"threads must be at least 1, got {self.threads}")
         # These check themselves: here, so that it is done before a session has written anything.

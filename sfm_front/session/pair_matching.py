@@ -12,8 +12,8 @@ from sfm_front.types import Candidate, Uint32Array
 _MIN_INLIERS = 11
 
 
-class Pairing:
-    """Matches in full the candidates that will hardly be for nothing.
+class CandidateMatcher:
+    """Matches on all features only the candidates likely to be verified.
 
     Where the re-ranking's few hundred features showed how far a candidate is turned, all features
     are matched accordingly. Where they did not, a second look at some more features comes first,
@@ -21,22 +21,24 @@ class Pairing:
     would have been verified on all features, 31 of 73 with 11 to 15, and 109 of 110 with more.
     """
 
-    def __init__(self, matcher: Matcher, second_look: Reranker) -> None:
+    def __init__(self, matcher: Matcher, second_rerank: Reranker) -> None:
         self._matcher = matcher
-        self._second_look = second_look
+        self._second_rerank = second_rerank
 
     def match(
         self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]
     ) -> list[tuple[View, Uint32Array]]:
         """Candidates as re-ranked → those worth it, in their order, with their matches (K, 2)."""
-        doubtful = [candidate for candidate in candidates if candidate.turn_rad is None]
-        closer = {c.image_id: c for c in self._second_look.rerank(query, doubtful, views)}
+        doubtful = [candidate for candidate in candidates if candidate.rotation_rad is None]
+        closer = {c.image_id: c for c in self._second_rerank.rerank(query, doubtful, views)}
         looked = [closer.get(candidate.image_id, candidate) for candidate in candidates]
-        worth = [c for c in looked if c.turn_rad is not None or (c.inliers or 0) >= _MIN_INLIERS]
+        worth = [
+            c for c in looked if c.rotation_rad is not None or (c.inliers or 0) >= _MIN_INLIERS
+        ]
         others = [views[candidate.image_id] for candidate in worth]
         matches = self._matcher.match(
             query.features,
             [other.features for other in others],
-            [candidate.turn_rad for candidate in worth],
+            [candidate.rotation_rad for candidate in worth],
         )
         return list(zip(others, matches, strict=True))

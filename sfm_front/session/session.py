@@ -12,12 +12,12 @@ import pycolmap
 from sfm_front.errors import InputError
 from sfm_front.exporters.colmap import export_models
 from sfm_front.features.colmap_sift import ColmapSift
-from sfm_front.features.extraction import FeatureExtractor, PhotoDescriber
+from sfm_front.features.extraction import FeatureExtraction, FeatureExtractor
 from sfm_front.features.global_descriptors.descriptor import resolve
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.mapping.atlas import Atlas
-from sfm_front.mapping.view_graph import Scene
-from sfm_front.matching.guided_matching import GuidedPairing
+from sfm_front.mapping.view_graph import ViewGraph
+from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import make_matcher
 from sfm_front.matching.verification import Verifier, View
 from sfm_front.photos.cameras import CameraCatalog
@@ -26,16 +26,16 @@ from sfm_front.photos.source import PhotoPath
 from sfm_front.reports.run_report import Report
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.retrieval.retriever import Retriever
-from sfm_front.runtime.closeable import Closing
+from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.pair_matching import Pairing
-from sfm_front.storage.database import Store
+from sfm_front.session.pair_matching import CandidateMatcher
+from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import (
     Candidate,
-    DescribedPhoto,
+    ExtractedPhoto,
     ModelSummary,
     PairGeometry,
     Rejection,
@@ -47,7 +47,7 @@ from sfm_front.types import (
 _OUTPUTS = ("database.db", "database.db-shm", "database.db-wal", "retrieval.jsonl", "report.json")
 
 
-class Session(Closing):
+class Session(Closeable):
     """Reconstructs photos that arrive one at a time.
 
     ::
@@ -88,45 +88,45 @@ class Session(Closing):
             _clear(output)
         output.mkdir(parents=True, exist_ok=True)
         threads = self.options.threads
-        self._describer = PhotoDescriber(
+        self._describer = FeatureExtraction(
             PhotoReader(max_image_size=self.options.max_image_size),
             _extractor(device, self.options.max_features),
             descriptor,
             num_threads=threads,
         )
-        self._workers = Workers(threads)
+        self._workers = WorkerPool(threads)
         self._verifier = Verifier(self.options.verification)
         matcher = make_matcher(device, self.options.matching, self._workers)
-        self._reranker, second_look = (
+        self._reranker, second_rerank = (
             Reranker(options, matcher, self._verifier, self._workers)
-            for options in (self.options.rerank, self.options.second_look)
+            for options in (self.options.rerank, self.options.second_rerank)
         )
         self._retriever = Retriever(self.options.retrieval, descriptor.dimension)
-        self._pairing = Pairing(matcher, second_look)
-        self._guided = GuidedPairing(
+        self._pairing = CandidateMatcher(matcher, second_rerank)
+        self._guided = GuidedMatcher(
             self.options.guided, self.options.matching, self.options.verification, self._workers
         )
         self._duplicates = DuplicateFinder()
         self._cameras = CameraCatalog(self.options.cameras)
-        self._store = Store(database)
-        self._scene = Scene()
-        self._atlas = Atlas(self._scene, self.options.atlas)
+        self._database = PhotoDatabase(database)
+        self._view_graph = ViewGraph()
+        self._atlas = Atlas(self._view_graph, self.options.atlas)
         self._views: dict[int, View] = {}
         self._names: dict[int, str] = {}
         self._report = Report(output)
 
     def add(self, path: Path, name: str | None = None) -> StepReport:
         """Take in one photo; ``name`` is what it is called in the models (default: the file's)."""
-        return self.take(self._describer.describe(PhotoPath(name or path.name, path)))
+        return self.add_extracted(self._describer.describe(PhotoPath(name or path.name, path)))
 
-    def stream(self, photos: Iterable[PhotoPath]) -> Iterator[StepReport]:
+    def add_all(self, photos: Iterable[PhotoPath]) -> Iterator[StepReport]:
         """Take in photos in order, the next ones described while one is matched and mapped."""
         for described in self._describer.stream(photos):
-            yield self.take(described)
+            yield self.add_extracted(described)
 
-    def take(self, photo: DescribedPhoto | Skipped) -> StepReport:
+    def add_extracted(self, photo: ExtractedPhoto | Skipped) -> StepReport:
         """Take in a photo that is described already."""
-        if isinstance(photo, DescribedPhoto):
+        if isinstance(photo, ExtractedPhoto):
             photo = self._duplicates.check(photo.name, photo.digest) or photo
         if isinstance(photo, Skipped):
             step = StepReport(photo.name, skipped=photo)
@@ -158,10 +158,10 @@ class Session(Closing):
     def close(self) -> None:
         self._describer.close()
         self._workers.close()
-        self._store.close()
+        self._database.close()
         self._report.close()
 
-    def _place(self, photo: DescribedPhoto) -> StepReport:
+    def _place(self, photo: ExtractedPhoto) -> StepReport:
         """The method: retrieve, verify, store, map, remember."""
         clock = Stopwatch()
         image_id = len(self._views) + 1
@@ -171,15 +171,15 @@ class Session(Closing):
             candidates = self._retriever.candidates(photo.global_vector)
         with clock.stage("rerank"):
             candidates = self._reranker.rerank(
-                view, candidates, self._views, enough=self.options.matched
+                view, candidates, self._views, enough=self.options.num_matched
             )
-        pairs = self._match(view, candidates[: self.options.unguided], clock)
-        if further := candidates[self.options.unguided : self.options.matched]:
+        pairs = self._match(view, candidates[: self.options.num_matched_first], clock)
+        if further := candidates[self.options.num_matched_first : self.options.num_matched]:
             pairs += self._match_guided(view, further, pairs, clock)
         with clock.stage("store"):
-            self._store.write(image_id, photo, camera, pairs)
+            self._database.write(image_id, photo, camera, pairs)
         with clock.stage("map"):
-            self._scene.add(image_id, photo.name, camera, photo.features.keypoints, pairs)
+            self._view_graph.add(image_id, photo.name, camera, photo.features.keypoints, pairs)
             registered = self._atlas.add(image_id)
         # Apart from the rest of mapping: it alone depends on how many photos came before.
         clock.move("map", "refine", self._atlas.take_refinement_seconds())
@@ -224,14 +224,14 @@ class Session(Closing):
     ) -> list[PairGeometry]:
         """Match with further candidates where the pose that follows from the pairs has them.
 
-        Those that it tells nothing of are matched like the first ones.
+        Candidates without a known pose are matched unguided.
         """
         with clock.stage("locate"):
             posed = self._atlas.locate(view.camera.camera_id, view.features.keypoints, pairs)
         guided: list[PairGeometry] = []
         if posed is not None:
             with clock.stage("guide"):
-                others = self._atlas.posed(candidate.image_id for candidate in candidates)
+                others = self._atlas.poses_of(candidate.image_id for candidate in candidates)
                 guided = self._guided.match(view, posed, candidates, self._views, others)
         found = {pair.image_id2 for pair in guided}
         left = [candidate for candidate in candidates if candidate.image_id not in found]

@@ -1,4 +1,4 @@
-"""Arrays in a folder of files, by key: written whole or not at all, and a broken one is none."""
+"""Arrays in a folder of files, by key: written whole or not at all; broken files are absent."""
 
 from __future__ import annotations
 

@@ -9,11 +9,11 @@ import numpy as np
 import pycolmap
 
 from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
-from sfm_front.runtime.closeable import Closing
-from sfm_front.types import DescribedPhoto, GeoPosition, PairGeometry
+from sfm_front.runtime.closeable import Closeable
+from sfm_front.types import ExtractedPhoto, GeoPosition, PairGeometry
 
 
-class Store(Closing):
+class PhotoDatabase(Closeable):
     """Writes photos to a COLMAP database that COLMAP's own tools can go on with."""
 
     def __init__(self, path: Path) -> None:
@@ -23,7 +23,7 @@ class Store(Closing):
     def write(
         self,
         image_id: int,
-        photo: DescribedPhoto,
+        photo: ExtractedPhoto,
         camera: pycolmap.Camera,
         pairs: Sequence[PairGeometry],
     ) -> None:

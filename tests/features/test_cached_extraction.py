@@ -12,8 +12,8 @@ from helpers import photo_files
 from PIL import Image
 
 from sfm_front.features import feature_cache as description_files
-from sfm_front.features.cached_extraction import CachedDescriber, Recalled, crop
-from sfm_front.features.feature_cache import DescriptionFiles, LocalDescription
+from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto, crop
+from sfm_front.features.feature_cache import CachedFeatures, FeatureCache
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor
@@ -55,7 +55,7 @@ class Setup:
     ) -> None:
         self.network = MeanColor(fingerprint)
         self.sift = CountingSift(max_features)
-        self.describer = CachedDescriber(
+        self.describer = CachedExtraction(
             folder / "cache",
             PhotoReader(max_image_size=size),
             self.sift,
@@ -71,7 +71,7 @@ def photo(tmp_path) -> PhotoPath:
     return PhotoPath("1_0.png", photo_files.save(tmp_path, "1_0.png")[0])
 
 
-def same(first: Recalled, second: Recalled) -> bool:
+def same(first: CachedPhoto, second: CachedPhoto) -> bool:
     features = zip(
         *((r.photo.features.keypoints, r.photo.features.descriptors) for r in (first, second)),
         strict=True,
@@ -186,14 +186,14 @@ def test_photos_come_in_order_and_bad_ones_with_their_reason(tmp_path, photo):
     paths = [blank, photo.path, text, tmp_path / "missing.png"]
     photos = [PhotoPath(path.name, path) for path in paths]
     results = list(Setup(tmp_path).describer.stream(photos, num_threads=2))
-    assert [type(result) for result in results] == [Skipped, Recalled, Skipped, Skipped]
+    assert [type(result) for result in results] == [Skipped, CachedPhoto, Skipped, Skipped]
     assert results[0].reason is SkipReason.NO_FEATURES
     assert results[2].reason is SkipReason.NOT_AN_IMAGE
     assert results[3].reason is SkipReason.UNREADABLE
 
 
 def test_what_a_camera_wrote_comes_back(tmp_path, photo):
-    files = DescriptionFiles(tmp_path / "files")
+    files = FeatureCache(tmp_path / "files")
     exif = Exif(
         make="Zeiß",
         model="Ikon",
@@ -203,14 +203,14 @@ def test_what_a_camera_wrote_comes_back(tmp_path, photo):
         orientation=6,
     )
     features = Setup(tmp_path).describer.describe(photo).photo.features
-    files.save_local("a" * 32, LocalDescription(320, 240, exif, features))
+    files.save_local("a" * 32, CachedFeatures(320, 240, exif, features))
     assert files.load_local("a" * 32).exif == exif
     assert files.load_local("b" * 32) is None
 
 
 def test_arrays_that_do_not_fit_each_other_count_as_damaged(tmp_path, photo):
-    files = DescriptionFiles(tmp_path / "files")
+    files = FeatureCache(tmp_path / "files")
     features = Setup(tmp_path).describer.describe(photo).photo.features
     odd = replace(features, descriptors=features.descriptors[:-1])
-    files.save_local("a" * 32, LocalDescription(320, 240, Exif(), odd))
+    files.save_local("a" * 32, CachedFeatures(320, 240, Exif(), odd))
     assert files.load_local("a" * 32) is None

@@ -10,7 +10,7 @@ from PIL import Image
 
 from sfm_front.features.colmap_sift import ColmapSift
 from sfm_front.features.sift import SiftExtractor
-from sfm_front.matching.nearest_neighbors import MatchingOptions, match
+from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors
 from sfm_front.types import Features, Photo
 
 OFFSET_PX = 0.1
@@ -38,7 +38,7 @@ def features(texture) -> Features:
 
 def test_its_keypoints_stand_where_opencvs_do(features, texture):
     ours = SiftExtractor().extract(photo_of(texture))
-    matches = match(features.descriptors, ours.descriptors, MatchingOptions())
+    matches = match_descriptors(features.descriptors, ours.descriptors, MatchingOptions())
     assert len(matches) > 150
     offsets = features.keypoints[matches[:, 0], :2] - ours.keypoints[matches[:, 1], :2]
     assert np.abs(np.median(offsets, axis=0)).max() < OFFSET_PX

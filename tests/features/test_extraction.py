@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sfm_front.features.extraction import PhotoDescriber
+from sfm_front.features.extraction import FeatureExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.photos.source import PhotoPath
-from sfm_front.types import DescribedPhoto, Skipped, SkipReason
+from sfm_front.types import ExtractedPhoto, Skipped, SkipReason
 
 VECTOR_TOLERANCE = 1e-6  # float32
 
@@ -57,9 +57,9 @@ def photos(tmp_path_factory) -> list[PhotoPath]:
     return made
 
 
-def describer(num_threads: int, network: MeanColour | None = None) -> PhotoDescriber:
+def describer(num_threads: int, network: MeanColour | None = None) -> FeatureExtraction:
     networks = [] if network is None else [network]
-    return PhotoDescriber(
+    return FeatureExtraction(
         PhotoReader(),
         SiftExtractor(200),
         GlobalDescriptor(networks=networks, local=[Vlad()]),
@@ -67,7 +67,7 @@ def describer(num_threads: int, network: MeanColour | None = None) -> PhotoDescr
     )
 
 
-def content(photo: DescribedPhoto | Skipped) -> object:
+def content(photo: ExtractedPhoto | Skipped) -> object:
     if isinstance(photo, Skipped):
         return photo
     features = photo.features
@@ -98,7 +98,7 @@ def test_threads_do_not_change_what_is_described(photos):
 def test_a_photo_is_what_its_parts_say(photos):
     with describer(1) as describe:
         result = describe.describe(photos[0])
-    assert isinstance(result, DescribedPhoto)
+    assert isinstance(result, ExtractedPhoto)
     photo = PhotoReader().read(photos[0].path, photos[0].name)
     assert (result.path, result.width, result.height) == (photos[0].path, 208, 160)
     assert result.digest == photo.digest
@@ -114,7 +114,7 @@ def test_the_network_runs_beside_sift(photos):
     network = MeanColour()
     with describer(1, network) as describe:
         result = describe.describe(photos[0])
-    assert isinstance(result, DescribedPhoto)
+    assert isinstance(result, ExtractedPhoto)
     assert set(result.seconds) == {"read", "sift", "vlad", "network"}
     assert len(network.threads) == 1
     assert network.threads[0] != threading.get_ident()

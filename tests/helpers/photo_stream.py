@@ -10,16 +10,16 @@ import pycolmap
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, as_described
 from sfm_front.features.global_descriptors.vlad import Vlad
-from sfm_front.mapping.view_graph import Scene
+from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.matching.verification import View
-from sfm_front.types import DescribedPhoto, Features, Float64Array, PairGeometry
+from sfm_front.types import ExtractedPhoto, Features, Float64Array, PairGeometry
 
 MIN_SHARED_POINTS = 30
 
 _VLAD = Vlad()
 
 
-def described(scene: SyntheticScene, index: int, *, prefix: str = "") -> DescribedPhoto:
+def described(scene: SyntheticScene, index: int, *, prefix: str = "") -> ExtractedPhoto:
     """Photo ``index`` as if it had been read and described."""
     photo = scene.photo(index)
     named = replace(photo, name=prefix + photo.name)
@@ -67,16 +67,16 @@ def centre_of(cam_from_world: pycolmap.Rigid3d) -> Float64Array:
 
 
 class SceneFeed:
-    """Adds photos of a synthetic scene to a ``Scene``, each with its true pairs with earlier ones.
+    """Adds photos of a synthetic scene to a ``ViewGraph``, with their true pairs with earlier ones.
 
     A photo gets the next free image id, counted from 1, and its name after ``prefix``.
     """
 
     def __init__(
-        self, synthetic: SyntheticScene, scene: Scene | None = None, *, prefix: str = ""
+        self, synthetic: SyntheticScene, scene: ViewGraph | None = None, *, prefix: str = ""
     ) -> None:
         self.synthetic = synthetic
-        self.scene = Scene() if scene is None else scene
+        self.scene = ViewGraph() if scene is None else scene
         self._prefix = prefix
         self.index_of: dict[int, int] = {}
         self._camera = pycolmap.Camera(synthetic.camera.todict())

@@ -13,7 +13,7 @@ from helpers.photo_stream import SceneFeed, position_errors_m, registered_names,
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
 from sfm_front.mapping.model import MapperOptions, Model
-from sfm_front.mapping.view_graph import Scene
+from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry
 
 NUM_PHOTOS = 16
@@ -135,7 +135,7 @@ def test_models_that_come_to_connect_are_joined(orbit):
         atlas.add(feed.add(index))
     atlas.finish()
     assert_whole(atlas, orbit)
-    assert any("joined" in event for event in atlas.take_events())
+    assert any("a larger one holds them all" in event for event in atlas.take_events())
 
 
 class TruckFeed(SceneFeed):
@@ -218,7 +218,7 @@ def test_events_tell_how_models_began_and_are_told_once(orbit):
 
 
 def test_an_atlas_without_photos_or_matches_ends_without_models():
-    atlas = Atlas(Scene(), OPTIONS)
+    atlas = Atlas(ViewGraph(), OPTIONS)
     assert atlas.waiting == []
     stranger = SceneFeed(make_scene(1, 50, seed=8))
     alone = run(stranger, [0])

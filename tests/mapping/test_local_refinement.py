@@ -64,7 +64,7 @@ def test_around_one_photo_it_is_what_colmap_does():
 
 
 def test_photos_of_a_large_model_share_an_adjustment(monkeypatch):
-    monkeypatch.setattr(local_refinement, "photos_together", lambda _: 3)
+    monkeypatch.setattr(local_refinement, "local_refinement_batch", lambda _: 3)
     adjusted: list[int] = []
     ours = LocalRefinement(OPTIONS)
 
@@ -81,7 +81,7 @@ def test_photos_of_a_large_model_share_an_adjustment(monkeypatch):
 
 
 def test_what_was_refined_with_the_whole_model_is_forgotten(monkeypatch):
-    monkeypatch.setattr(local_refinement, "photos_together", lambda _: 2)
+    monkeypatch.setattr(local_refinement, "local_refinement_batch", lambda _: 2)
     ours = LocalRefinement(OPTIONS)
     waiting: list[bool] = []
 

@@ -11,9 +11,9 @@ from helpers.photo_stream import SceneFeed, position_errors_m
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.mapping.model import InitialPairDemands, MapperOptions, Model
+from sfm_front.mapping.model import InitialPairConstraints, MapperOptions, Model
 
-DEMANDS = InitialPairDemands(min_angle_deg=10, min_inliers=50)
+DEMANDS = InitialPairConstraints(min_angle_deg=10, min_inliers=50)
 # The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
 POSITION_TOLERANCE_M = 0.15
 POSE_TOLERANCE_DEG = 0.5
@@ -83,7 +83,7 @@ def test_it_grows_photo_by_photo_as_they_arrive(orbit):
 def test_a_pair_without_parallax_starts_nothing(orbit):
     feed = SceneFeed(orbit)
     feed.add_all(range(3))
-    steep = InitialPairDemands(min_angle_deg=60, min_inliers=50)
+    steep = InitialPairConstraints(min_angle_deg=60, min_inliers=50)
     assert not Model(feed.scene, MapperOptions()).initialize(2, 1, steep)
 
 
@@ -91,7 +91,7 @@ def test_a_pair_with_few_matches_starts_nothing(orbit):
     feed = SceneFeed(orbit)
     feed.add_all(range(3))
     assert Model(feed.scene, MapperOptions()).initialize(2, 1, DEMANDS)
-    many = InitialPairDemands(min_angle_deg=10, min_inliers=10_000)
+    many = InitialPairConstraints(min_angle_deg=10, min_inliers=10_000)
     assert not Model(feed.scene, MapperOptions()).initialize(2, 1, many)
 
 
@@ -137,7 +137,7 @@ def test_photos_that_see_nothing_of_it_are_left_alone(orbit):
     model = started(feed)
     assert model.num_visible_points(behind) == 0
     assert model.grow([behind]) == []
-    assert model.grow_without_structure([behind]) == []
+    assert model.register_structure_less([behind]) == []
     assert model.registered == {1, 2}
 
 
@@ -182,7 +182,7 @@ def test_matches_to_photos_without_points_are_enough_at_the_end(orbit):
         if seen_by & {4, 5} and model.num_visible_points(6) > 10:
             model._mapper.observation_manager.delete_point3D(point_id)
     assert model.grow([6]) == []
-    assert model.grow_without_structure([6]) == [6]
+    assert model.register_structure_less([6]) == [6]
     assert position_errors_m(reconstruction, orbit).max() < 2 * POSITION_TOLERANCE_M
 
 
@@ -218,4 +218,4 @@ def test_values_out_of_range_are_refused_by_name(wrong):
 
 def test_a_model_of_no_points_cannot_be_asked_for():
     with pytest.raises(ConfigError, match="min_points"):
-        InitialPairDemands(min_angle_deg=10, min_inliers=50, min_points=0)
+        InitialPairConstraints(min_angle_deg=10, min_inliers=50, min_points=0)

@@ -10,15 +10,19 @@ from sfm_front.errors import ConfigError
 from sfm_front.mapping.refinement_schedule import (
     RefinementSchedule,
     ScheduleOptions,
-    photos_together,
+    local_refinement_batch,
 )
 
 
 def refinements(
-    num_images: int, *, growth: float, late_growth: float | None = None, points_per_image: int = 200
+    num_images: int,
+    *,
+    growth: float,
+    large_growth: float | None = None,
+    points_per_image: int = 200,
 ) -> list[int]:
     """The sizes at which a model that grows photo by photo is refined, from 2 photos on."""
-    options = ScheduleOptions(growth=growth, late_growth=late_growth or growth)
+    options = ScheduleOptions(growth=growth, large_growth=large_growth or growth)
     schedule = RefinementSchedule(options)
     schedule.refined(2, 2 * points_per_image)
     sizes = []
@@ -55,7 +59,7 @@ def test_no_model_waits_longer_than_its_growth_allows():
 
 
 def test_a_large_model_may_grow_further():
-    sizes = refinements(2000, growth=1.25, late_growth=1.6)
+    sizes = refinements(2000, growth=1.25, large_growth=1.6)
     growths = [(earlier, later / earlier) for earlier, later in pairwise(sizes)]
     assert {growth < 1.3 for size, growth in growths if 20 <= size < 100} == {True}
     assert {1.6 <= growth < 1.61 for size, growth in growths if size >= 100} == {True}
@@ -69,14 +73,14 @@ def test_growth_in_points_alone_is_enough():
     assert schedule.is_due(135, 1001)
 
 
-@pytest.mark.parametrize("name", ["growth", "late_growth"])
+@pytest.mark.parametrize("name", ["growth", "large_growth"])
 def test_without_growth_there_is_no_schedule(name):
     with pytest.raises(ConfigError, match=f"{name} must be above 1, got 1"):
         ScheduleOptions(**{name: 1.0})
 
 
 def test_the_larger_a_model_the_more_photos_share_a_local_refinement():
-    assert {photos_together(size) for size in range(2, 250)} == {1}
-    assert photos_together(250) == 2
+    assert {local_refinement_batch(size) for size in range(2, 250)} == {1}
+    assert local_refinement_batch(250) == 2
     # Each checks the whole model: for a photo, that stays below the check of 250 photos.
-    assert all(size / photos_together(size) <= 250 for size in range(2, 10_000, 7))
+    assert all(size / local_refinement_batch(size) <= 250 for size in range(2, 10_000, 7))

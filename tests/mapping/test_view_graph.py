@@ -8,7 +8,7 @@ import pytest
 from helpers.photo_stream import SceneFeed, centre_of, true_matches, true_pair
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.mapping.view_graph import Scene
+from sfm_front.mapping.view_graph import ViewGraph
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_the_angle_of_a_pair_is_in_degrees(orbit, feed):
 def test_the_angle_of_a_pair_without_a_relative_pose_is_unknown(orbit):
     pair = true_pair(orbit, 0, 1, (2, 1))
     pair.two_view_geometry.tri_angle = -1
-    scene = Scene()
+    scene = ViewGraph()
     for image_id in (1, 2):
         keypoints = orbit.photo(2 - image_id).features.keypoints
         camera = pycolmap.Camera(orbit.camera.todict())
@@ -104,7 +104,7 @@ def test_a_later_photo_may_bring_a_new_camera(orbit, feed):
 
 
 def test_points_are_the_keypoints(orbit):
-    feed = SceneFeed(orbit, Scene())
+    feed = SceneFeed(orbit, ViewGraph())
     feed.add(3)
     _, model = feed.scene.new_mapper()
     points = np.array([point.xy for point in model.images[1].points2D])

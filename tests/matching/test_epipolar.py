@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sfm_front.matching.epipolar import EpipolarPlanes
-from sfm_front.matching.match_mask import Meetings
+from sfm_front.matching.match_mask import MatchMask
 
 BAND_RAD = 0.004
 MIN_SINE = 0.05
@@ -24,13 +24,13 @@ def looking(rng: np.random.Generator, count: int) -> np.ndarray:
     return unit(np.column_stack([rng.uniform(-0.6, 0.6, (count, 2)), np.ones(count)]))
 
 
-def met(meetings: Meetings, count1: int, count2: int) -> np.ndarray:
+def met(mask: MatchMask, count1: int, count2: int) -> np.ndarray:
     """(N, M): how often features meet."""
     times = np.zeros((count1, count2), int)
-    for rows, columns, meet in meetings.blocks:
-        ids = np.ix_(meetings.order1[rows], meetings.order2[columns])
-        assert len(np.unique(meetings.order1[rows])) == len(meetings.order1[rows])
-        np.add.at(times, ids, meet)
+    for rows, columns, allowed in mask.blocks:
+        ids = np.ix_(mask.order1[rows], mask.order2[columns])
+        assert len(np.unique(mask.order1[rows])) == len(mask.order1[rows])
+        np.add.at(times, ids, allowed)
     return times
 
 
@@ -47,7 +47,7 @@ def test_just_those_in_the_band_meet_and_only_once(baseline):
     rng = np.random.default_rng(0)
     rays1, rays2 = looking(rng, 500), looking(rng, 700)
     planes = EpipolarPlanes(np.array(baseline), rays1, rays2)
-    times = met(planes.meetings(BAND_RAD), 500, 700)
+    times = met(planes.mask(BAND_RAD), 500, 700)
     axis = unit(np.array(baseline))
     told = np.ix_(
         *(np.linalg.norm(np.cross(rays, axis), axis=1) > MIN_SINE for rays in (rays1, rays2))
@@ -78,7 +78,7 @@ def test_what_has_no_ray_meets_nothing():
     rays1, rays2 = looking(rng, 50), looking(rng, 60)
     rays1[3] = rays2[7] = np.nan
     planes = EpipolarPlanes(np.array(SIDEWAYS), rays1, rays2)
-    times = met(planes.meetings(0.5), 50, 60)
+    times = met(planes.mask(0.5), 50, 60)
     assert not times[3].any()
     assert not times[:, 7].any()
     assert times.any()
@@ -89,4 +89,4 @@ def test_what_has_no_ray_meets_nothing():
 def test_photos_without_features_are_fine(count1, count2):
     rng = np.random.default_rng(3)
     planes = EpipolarPlanes(np.array(SIDEWAYS), looking(rng, count1), looking(rng, count2))
-    assert met(planes.meetings(BAND_RAD), count1, count2).sum() == 0
+    assert met(planes.mask(BAND_RAD), count1, count2).sum() == 0

@@ -11,11 +11,11 @@ from helpers.photo_stream import true_matches, true_pair, view_of
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.geometry.posed_camera import Posed
-from sfm_front.matching.guided_matching import GuidedOptions, GuidedPairing, two_view_geometry
+from sfm_front.geometry.posed_camera import PosedCamera
+from sfm_front.matching.guided_matching import GuidedMatcher, GuidedOptions, two_view_geometry
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import VerificationOptions, View
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.types import Candidate, PairGeometry
 
 QUERY, NEAR, NEXT = 0, 1, 2
@@ -35,14 +35,14 @@ def views(orbit) -> dict[int, View]:
 
 
 @pytest.fixture(scope="module")
-def truth(orbit) -> dict[int, Posed]:
-    return {i: Posed(orbit.camera, orbit.cams_from_world[i]) for i in (QUERY, NEAR, NEXT)}
+def truth(orbit) -> dict[int, PosedCamera]:
+    return {i: PosedCamera(orbit.camera, orbit.cams_from_world[i]) for i in (QUERY, NEAR, NEXT)}
 
 
 @pytest.fixture
 def guided():
-    with Workers(1) as workers:
-        yield GuidedPairing(GuidedOptions(), MatchingOptions(), VerificationOptions(), workers)
+    with WorkerPool(1) as workers:
+        yield GuidedMatcher(GuidedOptions(), MatchingOptions(), VerificationOptions(), workers)
 
 
 def looked_at(scene: SyntheticScene, index: int, count: int = 40) -> Candidate:
@@ -81,7 +81,7 @@ def test_the_geometry_is_what_colmap_would_have_estimated(orbit, views, truth, g
     pinhole = pycolmap.Camera.create_from_model_id(
         1, pycolmap.CameraModelId.PINHOLE, 900, 1600, 1200
     )
-    straight = {i: Posed(pinhole, posed.cam_from_world) for i, posed in truth.items()}
+    straight = {i: PosedCamera(pinhole, posed.cam_from_world) for i, posed in truth.items()}
     seen = [orbit.cams_from_world[i] * orbit.points[:200] for i in (QUERY, NEAR)]
     first, second = (np.column_stack([pinhole.img_from_cam(x), np.ones(200)]) for x in seen)
     fundamental = two_view_geometry(straight[QUERY], straight[NEAR]).F
@@ -93,7 +93,7 @@ def test_the_geometry_is_what_colmap_would_have_estimated(orbit, views, truth, g
 def test_poses_that_the_evidence_contradicts_are_not_believed(orbit, views, truth, guided):
     pose = truth[QUERY].cam_from_world
     tilt = pycolmap.Rigid3d(pycolmap.Rotation3d([0.0, 0.05, 0.0]), [0.0, 0.0, 0.0])
-    wrong = Posed(truth[QUERY].camera, tilt * pose)
+    wrong = PosedCamera(truth[QUERY].camera, tilt * pose)
     assert guided.match(views[QUERY], wrong, [looked_at(orbit, NEAR)], views, truth) == []
 
 
@@ -114,9 +114,13 @@ def test_without_evidence_or_pose_there_is_no_pair(why, orbit, views, truth, gui
 def test_matches_that_turn_otherwise_are_left_out(orbit, views, truth, guided):
     candidate = looked_at(orbit, NEAR)
 
-    def inliers(turn_rad: float | None) -> set[tuple[int, int]]:
+    def inliers(rotation_rad: float | None) -> set[tuple[int, int]]:
         found = guided.match(
-            views[QUERY], truth[QUERY], [replace(candidate, turn_rad=turn_rad)], views, truth
+            views[QUERY],
+            truth[QUERY],
+            [replace(candidate, rotation_rad=rotation_rad)],
+            views,
+            truth,
         )
         (pair,) = found or (PairGeometry(0, 0, candidate.matches[:0], pycolmap.TwoViewGeometry()),)
         return {tuple(row) for row in pair.matches.tolist()}

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sfm_front.matching.in_plane_rotation import common_turn, sectors, turned_alike
+from sfm_front.matching.in_plane_rotation import (
+    agrees_with_rotation,
+    in_plane_rotation,
+    rotation_mask,
+)
 
 TOLERANCE_RAD = 0.02
 WITHIN_RAD = np.deg2rad(20)
@@ -29,7 +33,7 @@ def test_the_turn_of_most_is_found_whatever_the_rest_does(turn):
     first = rng.uniform(0, 2 * np.pi, 200)
     second = first + turn + rng.normal(0, 0.05, 200)
     second[:30] = rng.uniform(0, 2 * np.pi, 30)
-    found = common_turn(keypoints(first), keypoints(second))
+    found = in_plane_rotation(keypoints(first), keypoints(second))
     assert found is not None
     assert angle_between(np.array(found), np.array(turn)) < TOLERANCE_RAD
 
@@ -37,22 +41,22 @@ def test_the_turn_of_most_is_found_whatever_the_rest_does(turn):
 def test_what_turns_every_way_has_no_common_turn():
     rng = np.random.default_rng(0)
     first, second = rng.uniform(0, 2 * np.pi, (2, 200))
-    assert common_turn(keypoints(first), keypoints(second)) is None
+    assert in_plane_rotation(keypoints(first), keypoints(second)) is None
 
 
 def test_a_handful_cannot_tell():
     few = np.linspace(0, 1, 15)
-    assert common_turn(keypoints(few), keypoints(few)) is None
-    assert common_turn(keypoints(np.zeros(0)), keypoints(np.zeros(0))) is None
+    assert in_plane_rotation(keypoints(few), keypoints(few)) is None
+    assert in_plane_rotation(keypoints(np.zeros(0)), keypoints(np.zeros(0))) is None
     enough = np.linspace(0, 1, 16)
-    assert common_turn(keypoints(enough), keypoints(enough)) == pytest.approx(0)
+    assert in_plane_rotation(keypoints(enough), keypoints(enough)) == pytest.approx(0)
 
 
 @pytest.mark.parametrize("turn", [0.0, 3.0, -2.0, 7.0])
 def test_matches_that_turn_with_the_photos_are_told_from_others(turn):
     off = np.deg2rad([0, 29, -29, 31, -31, 180, 331, 389])
     first = np.linspace(-3, 3, len(off))
-    alike = turned_alike(keypoints(first), keypoints(first + turn + off), turn)
+    alike = agrees_with_rotation(keypoints(first), keypoints(first + turn + off), turn)
     assert alike.tolist() == [True, True, True, False, False, False, True, True]
 
 
@@ -61,7 +65,7 @@ def test_those_that_agree_meet_once_and_those_that_do_not_never(turn):
     rng = np.random.default_rng(1)
     # Outside the circle once round, too: orientations are defined up to whole turns only.
     first, second = rng.uniform(-2, 8, 300), rng.uniform(-2, 8, 400)
-    plan = sectors(first, second, turn)
+    plan = rotation_mask(first, second, turn)
     met = np.zeros((300, 400), int)
     for rows, columns, _ in plan.blocks:
         met[np.ix_(plan.order1[rows], plan.order2[columns])] += 1
@@ -74,6 +78,6 @@ def test_those_that_agree_meet_once_and_those_that_do_not_never(turn):
 
 @pytest.mark.parametrize(("count1", "count2"), [(0, 4), (4, 0), (0, 0)])
 def test_photos_without_features_are_fine(count1, count2):
-    plan = sectors(np.zeros(count1, np.float32), np.zeros(count2, np.float32), 1.0)
+    plan = rotation_mask(np.zeros(count1, np.float32), np.zeros(count2, np.float32), 1.0)
     assert sum((rows.stop - rows.start) for rows, _, _ in plan.blocks) == count1
     assert all(columns.stop - columns.start == 0 for _, columns, _ in plan.blocks) or count2

@@ -8,8 +8,13 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import make_scene
-from sfm_front.matching.match_mask import Block, Meetings
-from sfm_front.matching.nearest_neighbors import MatchingOptions, match, match_meeting, match_turned
+from sfm_front.matching.match_mask import MaskBlock, MatchMask
+from sfm_front.matching.nearest_neighbors import (
+    MatchingOptions,
+    match_descriptors,
+    match_masked,
+    match_rotated,
+)
 from sfm_front.types import Features
 
 
@@ -60,7 +65,7 @@ def neighbours() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     ids=["default", "strict ratio", "no ratio", "small angle", "mutual only"],
 )
 def test_it_equals_brute_force(neighbours, options):
-    matches = match(*neighbours, options)
+    matches = match_descriptors(*neighbours, options)
     assert matches.dtype == np.uint32
     assert len(matches) > 30
     np.testing.assert_array_equal(matches, brute_force(*neighbours, options))
@@ -69,7 +74,7 @@ def test_it_equals_brute_force(neighbours, options):
 def test_every_test_takes_matches_away(neighbours):
     """Else equality with brute force would not show that each of them is applied."""
     counts = [
-        len(match(*neighbours, options))
+        len(match_descriptors(*neighbours, options))
         for options in (
             MatchingOptions(max_ratio=1.0, max_angle_rad=3.0),
             MatchingOptions(max_ratio=1.0),
@@ -82,7 +87,7 @@ def test_every_test_takes_matches_away(neighbours):
 
 
 def test_rows_rise_and_no_keypoint_is_matched_twice(neighbours):
-    matches = match(*neighbours, MatchingOptions(max_ratio=1.0, max_angle_rad=3.0))
+    matches = match_descriptors(*neighbours, MatchingOptions(max_ratio=1.0, max_angle_rad=3.0))
     assert (np.diff(matches[:, 0].astype(int)) > 0).all()
     assert len(np.unique(matches[:, 1])) == len(matches)
 
@@ -90,7 +95,7 @@ def test_rows_rise_and_no_keypoint_is_matched_twice(neighbours):
 def test_two_that_answer_alike_are_ambiguous(neighbours):
     descriptors = neighbours[0][:50]
     repeated = np.concatenate([descriptors, descriptors[:10]])
-    matches = match(descriptors, repeated, MatchingOptions())
+    matches = match_descriptors(descriptors, repeated, MatchingOptions())
     np.testing.assert_array_equal(matches, np.arange(10, 50)[:, None].repeat(2, axis=1))
 
 
@@ -98,20 +103,22 @@ def test_two_that_answer_alike_are_ambiguous(neighbours):
 def test_too_few_to_compare_give_no_matches(count1, count2):
     rng = np.random.default_rng(0)
     first, second = (rng.integers(0, 90, (n, 128), dtype=np.uint8) for n in (count1, count2))
-    assert match(first, second, MatchingOptions()).shape == (0, 2)
+    assert match_descriptors(first, second, MatchingOptions()).shape == (0, 2)
 
 
 def test_strangers_do_not_match():
     first, second = (make_scene(1, 300, seed=seed).photo(0) for seed in (1, 2))
-    matches = match(first.features.descriptors, second.features.descriptors, MatchingOptions())
+    matches = match_descriptors(
+        first.features.descriptors, second.features.descriptors, MatchingOptions()
+    )
     assert len(matches) < 0.02 * len(first.features)
 
 
 def test_a_strided_selection_of_descriptors_is_fine(neighbours):
     first, second = (np.ascontiguousarray(d[::2]) for d in neighbours)
     np.testing.assert_array_equal(
-        match(neighbours[0][::2], neighbours[1][::2], MatchingOptions()),
-        match(first, second, MatchingOptions()),
+        match_descriptors(neighbours[0][::2], neighbours[1][::2], MatchingOptions()),
+        match_descriptors(first, second, MatchingOptions()),
     )
 
 
@@ -124,10 +131,10 @@ def test_of_those_that_meet_it_equals_brute_force(neighbours):
     half = len(order1) // 2
     even, every = np.arange(0, len(order2), 2), slice(0, len(order2))
     blocks = (
-        Block(slice(0, half), even, meet[:half, even]),
-        Block(slice(half, len(order1)), every, meet[half:]),
+        MaskBlock(slice(0, half), even, meet[:half, even]),
+        MaskBlock(slice(half, len(order1)), every, meet[half:]),
     )
-    found = match_meeting(first, second, Meetings(order1, order2, blocks), options)
+    found = match_masked(first, second, MatchMask(order1, order2, blocks), options)
 
     apart = np.ones((len(first), len(second)), np.bool_)
     apart[np.ix_(order1[:half], order2[even])] = ~meet[:half, even]
@@ -148,14 +155,14 @@ def test_where_all_are_turned_alike_it_is_matching_as_before(neighbours):
         oriented(part, np.full(len(part), angle))
         for part, angle in zip(neighbours, (1, 3), strict=True)
     ]
-    found = match_turned(*turned, 2.0, MatchingOptions())
+    found = match_rotated(*turned, 2.0, MatchingOptions())
     assert found.dtype == np.uint32
-    np.testing.assert_array_equal(found, match(*neighbours, MatchingOptions()))
+    np.testing.assert_array_equal(found, match_descriptors(*neighbours, MatchingOptions()))
 
 
 def test_only_those_turned_alike_match(neighbours):
     first, second = neighbours
-    matches = match(first, second, MatchingOptions())
+    matches = match_descriptors(first, second, MatchingOptions())
     rng = np.random.default_rng(0)
     orientations = rng.uniform(0, 2 * np.pi, len(first))
     turned = rng.uniform(0, 2 * np.pi, len(second))
@@ -163,7 +170,7 @@ def test_only_those_turned_alike_match(neighbours):
     opposed = matches[::2]
     turned[opposed[:, 1]] += np.pi
     photos = oriented(first, orientations), oriented(second, turned)
-    found = {tuple(row) for row in match_turned(*photos, 2.5, MatchingOptions()).tolist()}
+    found = {tuple(row) for row in match_rotated(*photos, 2.5, MatchingOptions()).tolist()}
     assert {tuple(row) for row in matches[1::2].tolist()} <= found
     assert not found & {tuple(row) for row in opposed.tolist()}
 
@@ -175,9 +182,9 @@ def test_a_second_nearest_that_is_turned_elsewhere_does_not_make_it_ambiguous(ne
         oriented(descriptors, np.zeros(50)),
         oriented(repeated, np.repeat([0.0, np.pi], 50)),
     )
-    matches = match_turned(*photos, 0.0, MatchingOptions())
+    matches = match_rotated(*photos, 0.0, MatchingOptions())
     np.testing.assert_array_equal(matches, np.arange(50)[:, None].repeat(2, axis=1))
-    assert len(match(descriptors, repeated, MatchingOptions())) == 0
+    assert len(match_descriptors(descriptors, repeated, MatchingOptions())) == 0
 
 
 @pytest.mark.parametrize(("count1", "count2"), [(0, 5), (5, 0), (1, 5), (0, 0)])
@@ -187,7 +194,7 @@ def test_too_few_to_compare_give_no_matches_either_way(count1, count2):
         oriented(rng.integers(0, 90, (n, 128), dtype=np.uint8), np.zeros(n))
         for n in (count1, count2)
     ]
-    assert match_turned(*photos, 0.0, MatchingOptions()).shape == (0, 2)
+    assert match_rotated(*photos, 0.0, MatchingOptions()).shape == (0, 2)
 
 
 @pytest.mark.parametrize("wrong", [{"max_ratio": 0.0}, {"max_ratio": 1.1}, {"max_angle_rad": 0.0}])

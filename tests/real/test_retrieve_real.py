@@ -10,7 +10,7 @@ from helpers.locations import DATA
 from PIL import Image
 
 from sfm_front.cli.main import main
-from sfm_front.search.ground_truth import read_relevance
+from sfm_front.search.ground_truth import read_ground_truth
 
 SCENES = ("crazyhorse", "lund_door", "sceaux_castle", "strecha_fountain_P11")
 FAST = ("--max-image-size", "800", "--max-features", "1000", "--global-descriptor", "vlad")
@@ -51,7 +51,7 @@ def test_the_most_relevant_photo_is_of_the_querys_scene(folder, tmp_path):
 def test_pictures_of_an_answer(tmp_path, capsys):
     scene = DATA / "sceaux_castle"
     name = sorted((scene / "images").iterdir())[3].name
-    truth = read_relevance(scene / "pairs.txt", [p.name for p in (scene / "images").iterdir()])
+    truth = read_ground_truth(scene / "pairs.txt", [p.name for p in (scene / "images").iterdir()])
     assert len(truth.of(name)) > 5
     sheet, matches = tmp_path / "sheet.png", tmp_path / "matches.png"
     more = ("--truth", scene / "pairs.txt", "--sheet", sheet, "--draw-matches", matches)

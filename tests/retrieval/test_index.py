@@ -126,7 +126,7 @@ def test_a_widened_query_is_the_sum_with_its_best():
     best = np.argsort(-exact)[:3]
     wide = unit_length(query + exact[best] @ vectors[best])
     expected = vectors @ wide
-    found = index_of(vectors).query(query, 40, widen_by=3)
+    found = index_of(vectors).query(query, 40, num_expansion=3)
     order = [candidate.image_id for candidate in found]
     assert sorted(order) == list(range(40))
     np.testing.assert_allclose(expected[order], np.sort(expected)[::-1], atol=COSINE_TOLERANCE)
@@ -142,7 +142,7 @@ def test_a_query_widened_with_photos_is_the_sum_with_those():
     query, chosen = vectors[20], [3, 31]
     exact = vectors @ query
     wide = query + exact[chosen] @ vectors[chosen]
-    found = index_of(vectors).query(query, 40, widen_with=chosen)
+    found = index_of(vectors).query(query, 40, expand_with=chosen)
     order = [candidate.image_id for candidate in found]
     expected = vectors @ unit_length(wide)
     np.testing.assert_allclose(expected[order], np.sort(expected)[::-1], atol=COSINE_TOLERANCE)

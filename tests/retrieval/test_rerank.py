@@ -14,7 +14,7 @@ from sfm_front.matching.matcher import CpuMatcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import Verifier, View
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.types import Candidate
 
 QUERY = 0
@@ -38,7 +38,7 @@ def make_reranker():
     with ExitStack() as stack:
 
         def make(max_features: int = 800, num_threads: int = 1) -> Reranker:
-            workers = stack.enter_context(Workers(num_threads))
+            workers = stack.enter_context(WorkerPool(num_threads))
             options = RerankOptions(max_features=max_features)
             return Reranker(options, CpuMatcher(MatchingOptions(), workers), Verifier(), workers)
 
@@ -128,7 +128,7 @@ def test_it_tells_how_far_candidates_are_turned(views, make_reranker):
     turned = replace(view, features=replace(view.features, keypoints=keypoints))
     (upright,) = make_reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: view})
     (further,) = make_reranker().rerank(views[QUERY], [Candidate(1, 0.5)], {1: turned})
-    assert upright.turn_rad is not None
-    assert further.turn_rad - upright.turn_rad == pytest.approx(1.0, abs=0.01)
+    assert upright.rotation_rad is not None
+    assert further.rotation_rad - upright.rotation_rad == pytest.approx(1.0, abs=0.01)
     (stranger,) = make_reranker().rerank(views[QUERY], [Candidate(6, 0.5)], views)
-    assert stranger.turn_rad is None
+    assert stranger.rotation_rad is None

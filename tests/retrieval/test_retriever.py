@@ -14,7 +14,7 @@ from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import Verifier, View
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.types import Candidate
 
 COSINE_TOLERANCE = 0.01
@@ -28,7 +28,7 @@ def retriever():
 
 @pytest.fixture
 def reranker():
-    with Workers(1) as workers:
+    with WorkerPool(1) as workers:
         yield Reranker(RerankOptions(), CpuMatcher(MatchingOptions(), workers), Verifier(), workers)
 
 
@@ -93,7 +93,7 @@ def test_no_candidates_asked_for_is_refused():
         RetrievalOptions(candidates=0)
 
 
-@pytest.mark.parametrize("wrong", [{"candidates": 0}, {"widen_by": -1}])
+@pytest.mark.parametrize("wrong", [{"candidates": 0}, {"num_expansion": -1}])
 def test_values_out_of_range_are_refused_by_name(wrong):
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         RetrievalOptions(**wrong)

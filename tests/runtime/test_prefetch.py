@@ -10,7 +10,7 @@ import cv2
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from sfm_front.runtime.prefetch import map_ahead
+from sfm_front.runtime.prefetch import prefetch
 
 
 def test_results_come_in_the_items_order_whatever_finishes_first():
@@ -18,7 +18,7 @@ def test_results_come_in_the_items_order_whatever_finishes_first():
         time.sleep(0.05 if item == 0 else 0)
         return item * item
 
-    assert list(map_ahead(slow_first, range(7), num_threads=3)) == [n * n for n in range(7)]
+    assert list(prefetch(slow_first, range(7), num_threads=3)) == [n * n for n in range(7)]
 
 
 def test_no_more_items_are_taken_than_twice_the_threads_ahead():
@@ -29,7 +29,7 @@ def test_no_more_items_are_taken_than_twice_the_threads_ahead():
             taken.append(number)
             yield number
 
-    results = map_ahead(lambda item: item, items(), num_threads=2)
+    results = prefetch(lambda item: item, items(), num_threads=2)
     assert next(results) == 0
     assert len(taken) == 4
     assert next(results) == 1
@@ -39,7 +39,7 @@ def test_no_more_items_are_taken_than_twice_the_threads_ahead():
 
 def test_it_works_on_several_threads_at_once():
     meeting = threading.Barrier(2, timeout=10)
-    assert len(list(map_ahead(lambda _: meeting.wait(), range(2), num_threads=2))) == 2
+    assert len(list(prefetch(lambda _: meeting.wait(), range(2), num_threads=2))) == 2
 
 
 def test_an_error_reaches_the_caller_in_its_turn():
@@ -48,7 +48,7 @@ def test_an_error_reaches_the_caller_in_its_turn():
             raise ValueError("two")
         return item
 
-    results = map_ahead(fail_at_two, range(5), num_threads=2)
+    results = prefetch(fail_at_two, range(5), num_threads=2)
     assert [next(results), next(results)] == [0, 1]
     with pytest.raises(ValueError, match="two"):
         next(results)
@@ -73,7 +73,7 @@ def test_libraries_run_on_one_thread_until_the_end(end):
     cv2.setNumThreads(3)
     try:
         with threadpool_limits(2, user_api="blas"):
-            results = map_ahead(use, range(3), num_threads=2)
+            results = prefetch(use, range(3), num_threads=2)
             assert next(results) == (1, {1})
             assert library_threads() == (1, {1})
             if end == "last result":
@@ -100,10 +100,10 @@ def test_closed_early_it_starts_nothing_more():
             assert let_go.wait(10)
         return item
 
-    results = map_ahead(wait, range(4), num_threads=2)
+    results = prefetch(wait, range(4), num_threads=2)
     assert next(results) == 0
     both_are_busy.wait()
-    # Closing waits for the items that are worked on.
+    # Closeable waits for the items that are worked on.
     threading.Timer(0.3, let_go.set).start()
     results.close()
     assert sorted(started) == [0, 1, 2]

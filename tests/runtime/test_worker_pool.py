@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import threadpoolctl
 
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 
 
 @pytest.mark.parametrize("num_threads", [1, 3])
@@ -23,18 +23,18 @@ def test_results_come_in_the_order_of_the_items(num_threads):
             first_waits.set()
         return -item
 
-    with Workers(num_threads) as workers:
+    with WorkerPool(num_threads) as workers:
         assert workers.map(negative, iter(range(6))) == [0, -1, -2, -3, -4, -5]
 
 
 def test_one_thread_is_the_callers():
-    with Workers(1) as workers:
+    with WorkerPool(1) as workers:
         assert workers.map(lambda _: threading.get_ident(), range(3)) == [threading.get_ident()] * 3
 
 
 def test_several_threads_work_side_by_side():
     meeting = threading.Barrier(3)
-    with Workers(3) as workers:
+    with WorkerPool(3) as workers:
         # Each waits for the others: one thread alone would never get past the first item.
         assert sorted(workers.map(lambda _: meeting.wait(10), range(3))) == [0, 1, 2]
 
@@ -48,7 +48,7 @@ def blas_threads() -> set[int]:
 def test_matrix_products_stay_on_their_thread_while_the_workers_are_there():
     with threadpoolctl.threadpool_limits(2, user_api="blas"):
         before = blas_threads()
-        with Workers(2) as workers:
+        with WorkerPool(2) as workers:
             assert workers.map(lambda _: blas_threads(), range(4)) == [{1}] * 4
         assert blas_threads() == before != {1}
 
@@ -56,7 +56,7 @@ def test_matrix_products_stay_on_their_thread_while_the_workers_are_there():
 def test_the_last_workers_to_be_closed_give_the_cores_back():
     with threadpoolctl.threadpool_limits(2, user_api="blas"):
         before = blas_threads()
-        first, second = Workers(1), Workers(1)
+        first, second = WorkerPool(1), WorkerPool(1)
         first.close()
         assert blas_threads() == {1}
         second.close()
@@ -70,12 +70,12 @@ def test_what_goes_wrong_reaches_the_caller(num_threads):
     def fail(item: int) -> int:
         raise ValueError(f"item {item}")
 
-    with Workers(num_threads) as workers, pytest.raises(ValueError, match="item 7"):
+    with WorkerPool(num_threads) as workers, pytest.raises(ValueError, match="item 7"):
         workers.map(fail, [7])
 
 
 def test_threads_end_with_the_workers():
-    with Workers(2) as workers:
+    with WorkerPool(2) as workers:
         names = workers.map(lambda _: threading.current_thread().name, range(8))
         assert all(name.startswith("sfm-pairs") for name in names)
     assert not {t.name for t in threading.enumerate()} & set(names)

@@ -11,17 +11,17 @@ from helpers import photo_files
 
 from sfm_front.cli.progress import CountLine
 from sfm_front.errors import ConfigError
-from sfm_front.features.cached_extraction import CachedDescriber
+from sfm_front.features.cached_extraction import CachedExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.photos.source import PhotoPath, list_photos
 from sfm_front.retrieval.retriever import RetrievalOptions
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.search.folder_search import Answer, FolderSearch, SearchOptions
 from sfm_front.search.photo_index import PhotoIndex
-from sfm_front.types import DescribedPhoto
+from sfm_front.types import ExtractedPhoto
 
 MATCH_ERROR_PX = 3.0
 RIGHT_MATCHES = 0.95
@@ -35,7 +35,7 @@ class World:
         names = [f"{scene}_{shift}.png" for scene in (1, 2, 3) for shift in (0, 60, 120)]
         photo_files.save(self.photos, *names)
         self.outside = photo_files.save(folder / "outside", "2_30.png")[0]
-        self.describer = CachedDescriber(
+        self.describer = CachedExtraction(
             folder / "index",
             PhotoReader(),
             SiftExtractor(400),
@@ -48,11 +48,11 @@ class World:
             progress=lambda total: CountLine("photo", total, io.StringIO()),
         )
 
-    def described(self, path: Path) -> DescribedPhoto:
+    def described(self, path: Path) -> ExtractedPhoto:
         return self.describer.describe(PhotoPath(path.name, path)).photo
 
     def ask(self, path: Path, **options) -> Answer:
-        with Workers(1) as workers:
+        with WorkerPool(1) as workers:
             search = FolderSearch(self.index, SearchOptions(**options), workers)
             return search.ask(self.described(path))
 
@@ -115,7 +115,7 @@ def test_no_such_method():
 
 
 def test_verified_matches_show_the_same_place(world):
-    with Workers(1) as workers:
+    with WorkerPool(1) as workers:
         search = FolderSearch(world.index, SearchOptions(), workers)
         photos = [world.described(world.photos / name) for name in ("3_0.png", "3_60.png")]
         matches = search.verified_matches(*photos)
@@ -126,7 +126,7 @@ def test_verified_matches_show_the_same_place(world):
 
 
 def test_photos_of_different_scenes_have_no_verified_matches(world):
-    with Workers(1) as workers:
+    with WorkerPool(1) as workers:
         search = FolderSearch(world.index, SearchOptions(), workers)
         photos = [world.described(world.photos / name) for name in ("3_0.png", "1_60.png")]
         matches = search.verified_matches(*photos)

@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 
 from sfm_front.errors import InputError
-from sfm_front.search.ground_truth import Relevance, read_relevance
+from sfm_front.search.ground_truth import GroundTruth, read_ground_truth
 
 PHOTOS = ["a.jpg", "b.jpg", "c.jpg", "my photo 3.jpg", "flight 1 20"]
 
 
-def read(tmp_path: Path, text: str) -> Relevance:
+def read(tmp_path: Path, text: str) -> GroundTruth:
     file = tmp_path / "truth.txt"
     file.write_text(text, encoding="utf-8")
-    return read_relevance(file, PHOTOS)
+    return read_ground_truth(file, PHOTOS)
 
 
 def test_names_are_relevant_to_every_query(tmp_path):
@@ -46,7 +46,7 @@ def test_a_file_that_names_no_photo_is_a_mistake(tmp_path, text):
 
 def test_a_file_that_cannot_be_read_is_a_mistake(tmp_path):
     with pytest.raises(InputError, match="No such file"):
-        read_relevance(tmp_path / "missing.txt", PHOTOS)
+        read_ground_truth(tmp_path / "missing.txt", PHOTOS)
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00\x80")
     with pytest.raises(InputError, match="not text in UTF-8"):
-        read_relevance(tmp_path / "binary", PHOTOS)
+        read_ground_truth(tmp_path / "binary", PHOTOS)

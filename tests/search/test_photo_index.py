@@ -13,7 +13,7 @@ from helpers import photo_files
 
 from sfm_front.cli.progress import CountLine
 from sfm_front.errors import InputError
-from sfm_front.features.cached_extraction import CachedDescriber
+from sfm_front.features.cached_extraction import CachedExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor
@@ -33,7 +33,7 @@ def folder(tmp_path) -> Path:
 
 def update(folder: Path, *, max_features: int = 200) -> tuple[PhotoIndex, Update]:
     location = folder.parent / "index"
-    describer = CachedDescriber(
+    describer = CachedExtraction(
         location,
         PhotoReader(),
         SiftExtractor(max_features),

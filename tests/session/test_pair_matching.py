@@ -12,8 +12,8 @@ from sfm_front.matching.matcher import CpuMatcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import Verifier, View
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
-from sfm_front.runtime.worker_pool import Workers
-from sfm_front.session.pair_matching import Pairing
+from sfm_front.runtime.worker_pool import WorkerPool
+from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.types import Candidate, Features, Uint32Array
 
 
@@ -28,11 +28,11 @@ class Recorder:
         self,
         query: Features,
         others: Sequence[Features],
-        turns_rad: Sequence[float | None],
+        rotations_rad: Sequence[float | None],
     ) -> list[Uint32Array]:
-        turned = None not in turns_rad
+        turned = None not in rotations_rad
         self.asked.append((len(query), len(others), turned))
-        return self._matcher.match(query, others, turns_rad)
+        return self._matcher.match(query, others, rotations_rad)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def views(orbit) -> dict[int, View]:
 
 @pytest.fixture
 def workers():
-    with Workers(1) as workers:
+    with WorkerPool(1) as workers:
         yield workers
 
 
@@ -61,15 +61,15 @@ def recorder(workers):
 def pairing_of(recorder, workers):
     """With a second look at so many features."""
 
-    def make(second_look: int) -> Pairing:
-        options = RerankOptions(max_features=second_look)
-        return Pairing(recorder, Reranker(options, recorder, Verifier(), workers))
+    def make(second_rerank: int) -> CandidateMatcher:
+        options = RerankOptions(max_features=second_rerank)
+        return CandidateMatcher(recorder, Reranker(options, recorder, Verifier(), workers))
 
     return make
 
 
 def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder, pairing_of):
-    candidates = [Candidate(1, 0.5, 100, turn_rad=0.0), Candidate(2, 0.4, 50, turn_rad=0.0)]
+    candidates = [Candidate(1, 0.5, 100, rotation_rad=0.0), Candidate(2, 0.4, 50, rotation_rad=0.0)]
     found = pairing_of(200).match(views[0], candidates, views)
     whole = len(views[0].features)
     assert [asked for asked in recorder.asked if asked[1]] == [(whole, 2, True)]

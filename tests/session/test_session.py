@@ -48,7 +48,7 @@ def session(orbit, tmp_path_factory) -> tuple[Path, list[StepReport], list[Model
     """Output folder, steps and models of the orbit in its order, the camera unknown."""
     output = tmp_path_factory.mktemp("session")
     with Session(output, options()) as session:
-        steps = [session.take(described(orbit, index)) for index in range(NUM_PHOTOS)]
+        steps = [session.add_extracted(described(orbit, index)) for index in range(NUM_PHOTOS)]
         models = session.finish()
     return output, steps, models
 
@@ -110,7 +110,7 @@ def test_a_step_says_what_was_retrieved_and_placed(orbit, session):
     # The neighbours on both sides of the circle.
     assert last.most_relevant in sorted(shared, key=shared.get, reverse=True)[:2]
     assert last.verified[0] == last.most_relevant
-    assert len(last.verified) <= SessionOptions().matched
+    assert len(last.verified) <= SessionOptions().num_matched
     names = [name for step in steps for name in step.registered]
     assert sorted(names) == [orbit.name(index) for index in range(NUM_PHOTOS)]
     assert last.num_registered == NUM_PHOTOS
@@ -127,7 +127,7 @@ def test_a_photo_that_can_be_located_is_matched_guided(session):
             for image_id in range(1, NUM_PHOTOS)
             if database.exists_two_view_geometry(NUM_PHOTOS, image_id)
         ]
-    assert len(geometries) == len(steps[-1].verified) > SessionOptions().unguided
+    assert len(geometries) == len(steps[-1].verified) > SessionOptions().num_matched_first
     # Each says where the photos stand to each other, in the same way whoever found it.
     for geometry in geometries:
         assert np.linalg.norm(geometry.cam2_from_cam1.translation) == pytest.approx(1)
@@ -156,7 +156,7 @@ def test_shuffled_photos_are_all_registered(orbit, tmp_path):
     random.Random(1).shuffle(order)
     with Session(tmp_path / "out", options()) as session:
         for index in order:
-            session.take(described(orbit, index))
+            session.add_extracted(described(orbit, index))
         models = session.finish()
     assert [model.num_registered for model in models] == [NUM_PHOTOS]
     assert position_errors_m(models[0].reconstruction, orbit).max() < POSITION_TOLERANCE_M
@@ -168,7 +168,7 @@ def test_two_places_give_two_models_the_largest_first(tmp_path):
         for index in range(10):
             for number, place in enumerate(places):
                 if number == 1 or index < 6:
-                    session.take(described(place, index, prefix=f"{number}/"))
+                    session.add_extracted(described(place, index, prefix=f"{number}/"))
         models = session.finish()
     assert [model.path.name for model in models] == ["0", "1"]
     assert [registered_names([model.reconstruction]) for model in models] == [
@@ -182,7 +182,7 @@ def test_the_database_does_not_depend_on_the_threads(orbit, session, tmp_path, t
     output, _, _ = session
     with Session(tmp_path / "out", options(threads)) as other:
         for index in range(NUM_PHOTOS):
-            other.take(described(orbit, index))
+            other.add_extracted(described(orbit, index))
     assert tables(tmp_path / "out" / "database.db") == tables(output / "database.db")
 
 
@@ -191,7 +191,7 @@ def test_with_one_thread_the_models_are_the_same_to_the_bit(orbit, tmp_path):
     for name in ("a", "b"):
         with Session(tmp_path / name, options()) as session:
             for index in range(8):
-                session.take(described(orbit, index))
+                session.add_extracted(described(orbit, index))
             session.finish()
         sparse = tmp_path / name / "sparse"
         written.append({p.relative_to(sparse): p.read_bytes() for p in sparse.rglob("*.*")})
@@ -202,7 +202,7 @@ def test_with_one_thread_the_models_are_the_same_to_the_bit(orbit, tmp_path):
 def test_a_known_calibration_is_used(orbit, tmp_path):
     cameras = CameraOptions(params=tuple(orbit.camera.params))
     with Session(tmp_path / "out", options(cameras=cameras)) as session:
-        session.take(described(orbit, 0))
+        session.add_extracted(described(orbit, 0))
     with pycolmap.Database.open(tmp_path / "out" / "database.db") as database:
         (camera,) = database.read_all_cameras()
     np.testing.assert_array_equal(camera.params, orbit.camera.params)
@@ -214,7 +214,7 @@ def test_duplicates_and_skipped_photos_take_no_image_id(orbit, tmp_path):
     copy = replace(photo, name="copy.jpg")
     unreadable = Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")
     with Session(tmp_path / "out", options()) as session:
-        steps = [session.take(p) for p in (photo, copy, unreadable, described(orbit, 1))]
+        steps = [session.add_extracted(p) for p in (photo, copy, unreadable, described(orbit, 1))]
         session.finish()
     assert [step.image_id for step in steps] == [1, None, None, 2]
     assert steps[1].skipped == Skipped("copy.jpg", SkipReason.DUPLICATE, "same file as 000000.jpg")
@@ -248,8 +248,8 @@ def test_a_session_does_not_write_over_another(session):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"matched": 0}, "matched must be at least 1, got 0"),
-        ({"unguided": 0}, "unguided must be at least 1, got 0"),
+        ({"num_matched": 0}, "num_matched must be at least 1, got 0"),
+        ({"num_matched_first": 0}, "num_matched_first must be at least 1, got 0"),
         ({"threads": 0}, "threads must be at least 1, got 0"),
         ({"global_descriptor": "bag"}, "no global descriptor is called 'bag'"),
         ({"max_features": 0}, "max_features must be at least 1"),

@@ -14,7 +14,7 @@ from helpers.locations import ROOT, TESTS
 from helpers.photo_stream import described, true_pair
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.storage.database import Store
+from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import Exif, GeoPosition
 
 ROTATION_TOLERANCE = 1e-9
@@ -33,7 +33,7 @@ def database(orbit, tmp_path):
     other = pycolmap.Camera(camera_id=5, model="OPENCV", width=400, height=300, params=params)
     other.has_prior_focal_length = True
     position = GeoPosition(47.5, -8.25, 512.0)
-    with Store(file) as store:
+    with PhotoDatabase(file) as store:
         store.write(1, described(orbit, 0), orbit.camera, [])
         store.write(2, described(orbit, 1), orbit.camera, [true_pair(orbit, 1, 0, (2, 1))])
         photo = replace(described(orbit, 2, prefix="süd flug/"), exif=Exif(position=position))
@@ -121,7 +121,7 @@ def test_gps_is_a_wgs84_prior_of_its_photo_alone(database):
 
 def test_a_position_without_altitude_is_kept(orbit, tmp_path):
     exif = Exif(position=GeoPosition(10.0, 20.0))
-    with Store(tmp_path / "database.db") as store:
+    with PhotoDatabase(tmp_path / "database.db") as store:
         store.write(1, replace(described(orbit, 0), exif=exif), orbit.camera, [])
     with pycolmap.Database.open(tmp_path / "database.db") as database:
         (prior,) = database.read_all_pose_priors()
@@ -134,14 +134,14 @@ import os, sys
 from pathlib import Path
 from helpers.photo_stream import described, true_pair
 from sfm_front.evaluation.synthetic.scene import make_scene
-from sfm_front.storage.database import Store
+from sfm_front.storage.database import PhotoDatabase
 
 def pairs():
     yield true_pair(orbit, 1, 0, (2, 1))
     os._exit(9)
 
 orbit = make_scene(12, 200, seed=2, layout="orbit")
-store = Store(Path(sys.argv[1]))
+store = PhotoDatabase(Path(sys.argv[1]))
 store.write(1, described(orbit, 0), orbit.camera, [])
 store.write(2, described(orbit, 1), orbit.camera, pairs())
 """
@@ -163,7 +163,7 @@ def test_a_killed_process_leaves_whole_photos(orbit, tmp_path):
         assert database.num_keypoints() == len(orbit.photo(0).features)
         assert database.num_matched_image_pairs() == 0
     # What is left can be gone on with.
-    with Store(file) as store:
+    with PhotoDatabase(file) as store:
         store.write(2, described(orbit, 1), orbit.camera, [true_pair(orbit, 1, 0, (2, 1))])
     with pycolmap.Database.open(file) as database:
         assert database.num_images() == 2
@@ -171,7 +171,7 @@ def test_a_killed_process_leaves_whole_photos(orbit, tmp_path):
 
 
 def test_a_photo_is_there_for_others_as_soon_as_it_is_written(orbit, tmp_path):
-    with Store(tmp_path / "database.db") as store:
+    with PhotoDatabase(tmp_path / "database.db") as store:
         for image_id in (1, 2):
             store.write(image_id, described(orbit, image_id - 1), orbit.camera, [])
             with pycolmap.Database.open(tmp_path / "database.db") as database:

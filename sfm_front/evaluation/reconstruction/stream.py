@@ -131,7 +131,7 @@ def run_stream(
             vector = descriptor.describe(np.empty(0, np.uint8), seen.features)
             photo = as_described(seen, scene.camera, vector)
             started, processor_started = perf_counter(), process_time()
-            step = session.take(photo)
+            step = session.add_extracted(photo)
             seconds = perf_counter() - started
             costs.append(
                 PhotoCost(

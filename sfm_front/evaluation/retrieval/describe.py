@@ -10,7 +10,7 @@ from pathlib import Path
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.retrieval.perceptual_hash import PerceptualHash, packed
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Query
-from sfm_front.features.cached_extraction import CachedDescriber, Recalled
+from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto
 from sfm_front.features.feature_cache import Box
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
@@ -32,7 +32,7 @@ class Described:
     skipped: tuple[Skipped, ...]
 
 
-class BenchDescriber:
+class BenchExtraction:
     """Gives photos all that any method asks for, and image ids that count up from 1."""
 
     def __init__(
@@ -52,7 +52,7 @@ class BenchDescriber:
         if PerceptualHash.name in descriptors:
             raise ConfigError(f"every photo has a {PerceptualHash.name}: do not ask for it")
         hashing = GlobalDescriptor(networks=[PerceptualHash()])
-        self._describer = CachedDescriber(
+        self._describer = CachedExtraction(
             cache,
             PhotoReader(max_image_size=max_image_size),
             SiftExtractor(max_features),
@@ -99,7 +99,7 @@ class BenchDescriber:
                 progress(done, len(paths))
         return Described(photos, tuple(skipped))
 
-    def _bench_photo(self, recalled: Recalled) -> BenchPhoto:
+    def _bench_photo(self, recalled: CachedPhoto) -> BenchPhoto:
         camera = self._cameras.camera_for(recalled.photo).camera
         vectors = dict(recalled.vectors)
         perceptual_hash = packed(vectors.pop(PerceptualHash.name))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from random import Random
 
 from sfm_front.errors import InputError
-from sfm_front.evaluation.retrieval.describe import BenchDescriber, Described
+from sfm_front.evaluation.retrieval.describe import BenchExtraction, Described
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Dataset, Query
 
 QueryKey = tuple[str, tuple[float, float, float, float] | None]
@@ -45,7 +45,7 @@ def sampled(queries: tuple[Query, ...], count: int | None) -> tuple[Query, ...]:
 
 
 def describe(
-    datasets: Sequence[Dataset], describer: BenchDescriber, note: Callable[[str], None]
+    datasets: Sequence[Dataset], describer: BenchExtraction, note: Callable[[str], None]
 ) -> Material:
     """Describe the photos and queries of ``datasets``, which all search the same photos.
 

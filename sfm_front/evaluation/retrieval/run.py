@@ -10,7 +10,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.retrieval import specs
 from sfm_front.evaluation.retrieval.benchmark import Outcome, benchmark
 from sfm_front.evaluation.retrieval.datasets.pool import MIN_SHARED_POINTS
-from sfm_front.evaluation.retrieval.describe import BenchDescriber
+from sfm_front.evaluation.retrieval.describe import BenchExtraction
 from sfm_front.evaluation.retrieval.distractors import WithDistractors
 from sfm_front.evaluation.retrieval.figures.writing import FigureWriter
 from sfm_front.evaluation.retrieval.material import Material, describe, sampled
@@ -22,7 +22,7 @@ from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, r
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 
 OURS = Hierarchical.name
 """Our method; ``ours:VECTOR`` is the same with another global vector."""
@@ -74,10 +74,10 @@ def run(
     What is wrong with settings or folders shows before the first photo is described.
     """
     outcomes: list[Outcome] = []
-    with Workers(settings.threads) as workers:
+    with WorkerPool(settings.threads) as workers:
         methods = [_method(name, workers, settings) for name in settings.methods]
         vectors = dict.fromkeys(name for method in methods for name in method.global_vectors)
-        describer = BenchDescriber(
+        describer = BenchExtraction(
             settings.cache,
             descriptors(vectors, settings.weights),
             max_image_size=settings.max_image_size_px,
@@ -120,7 +120,7 @@ def descriptors(names: Iterable[str], weights: Mapping[str, Path]) -> dict[str, 
     return resolved
 
 
-def _method(name: str, workers: Workers, settings: RetrievalSettings) -> Method:
+def _method(name: str, workers: WorkerPool, settings: RetrievalSettings) -> Method:
     ours, _, vector = name.partition(":")
     if ours == OURS:
         return Hierarchical(

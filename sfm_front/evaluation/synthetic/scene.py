@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.world import World, fly_orbit, fly_strip
-from sfm_front.types import DescribedPhoto, Exif, Features, Float32Array, Float64Array, Uint8Array
+from sfm_front.types import Exif, ExtractedPhoto, Features, Float32Array, Float64Array, Uint8Array
 
 Layout = Literal["orbit", "strip"]
 
@@ -173,12 +173,12 @@ def make_scene(
 
 def as_described(
     photo: SyntheticPhoto, camera: pycolmap.Camera, global_vector: Float32Array
-) -> DescribedPhoto:
+) -> ExtractedPhoto:
     """The photo as if ``camera`` had taken it and it had been read from a file and described.
 
     ``global_vector`` (D,) float32.
     """
-    return DescribedPhoto(
+    return ExtractedPhoto(
         name=photo.name,
         path=Path(photo.name),
         width=camera.width,

@@ -36,7 +36,7 @@ NETWORK_WEIGHT = 0.2
 Source_contra = TypeVar("Source_contra", contravariant=True)
 
 
-class Describer(Protocol[Source_contra]):
+class GlobalDescriptorPart(Protocol[Source_contra]):
     """One way to describe a photo: by its pixels (h, w, 3) uint8 RGB, or by its features."""
 
     @property
@@ -65,11 +65,11 @@ class GlobalDescriptor:
     def __init__(
         self,
         *,
-        networks: Sequence[Describer[Uint8Array]] = (),
-        local: Sequence[Describer[Features]] = (),
+        networks: Sequence[GlobalDescriptorPart[Uint8Array]] = (),
+        local: Sequence[GlobalDescriptorPart[Features]] = (),
     ) -> None:
         """``networks`` describe pixels, ``local`` describe features; one in all at least."""
-        parts: list[Describer[Any]] = [*networks, *local]
+        parts: list[GlobalDescriptorPart[Any]] = [*networks, *local]
         self.name = "+".join(part.name for part in parts)
         self.dimension = sum(part.dimension for part in parts)
         self.fingerprint = "+".join(part.fingerprint for part in parts)

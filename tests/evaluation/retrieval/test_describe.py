@@ -10,15 +10,15 @@ from helpers import photo_files
 from PIL import Image, ImageEnhance
 
 from sfm_front.errors import ConfigError
-from sfm_front.evaluation.retrieval.describe import BenchDescriber
+from sfm_front.evaluation.retrieval.describe import BenchExtraction
 from sfm_front.evaluation.retrieval.perceptual_hash import PerceptualHash, packed
 from sfm_front.evaluation.retrieval.types import Query
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 
 
-def describer(folder: Path) -> BenchDescriber:
-    return BenchDescriber(
+def describer(folder: Path) -> BenchExtraction:
+    return BenchExtraction(
         folder / "cache", {"vlad": GlobalDescriptor(local=[Vlad()])}, max_features=200
     )
 
@@ -71,7 +71,7 @@ def test_queries_are_described_within_their_boxes_under_their_names(tmp_path, ph
 def test_the_hash_needs_no_asking_for(tmp_path):
     hashing = GlobalDescriptor(networks=[PerceptualHash()])
     with pytest.raises(ConfigError, match="every photo has a phash"):
-        BenchDescriber(tmp_path, {"phash": hashing})
+        BenchExtraction(tmp_path, {"phash": hashing})
 
 
 def different_bits(first: Image.Image, second: Image.Image) -> int:

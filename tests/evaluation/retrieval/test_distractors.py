@@ -9,7 +9,7 @@ from helpers.bench_photos import NUM_FEATURES, bench_photo
 from sfm_front.evaluation.retrieval.distractor_vectors import VectorMaker
 from sfm_front.evaluation.retrieval.distractors import WithDistractors
 from sfm_front.features.global_descriptors.unit_vectors import unit_length
-from sfm_front.matching.nearest_neighbors import MatchingOptions, match
+from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors
 
 SCENES, PHOTOS_A_SCENE, DIMENSION = 6, 5, 512
 
@@ -91,5 +91,7 @@ def test_a_distractor_has_nobodys_descriptors(photos):
     pool = WithDistractors(photos, 100, 10**6)[-1].view.features
     assert len(pool) == len(photos) * NUM_FEATURES
     own = photos[0].view.features.descriptors
-    copies = match(own, pool.descriptors, MatchingOptions(max_angle_rad=0.3, max_ratio=1.0))
+    copies = match_descriptors(
+        own, pool.descriptors, MatchingOptions(max_angle_rad=0.3, max_ratio=1.0)
+    )
     assert len(copies) == 0

@@ -10,7 +10,7 @@ import torch
 from helpers.bench_photos import ByNumber, small_dataset
 from PIL import Image
 
-from sfm_front.evaluation.retrieval.describe import BenchDescriber
+from sfm_front.evaluation.retrieval.describe import BenchExtraction
 from sfm_front.evaluation.retrieval.figures.first_layer import first_layer, mosaic
 from sfm_front.evaluation.retrieval.figures.vector_plane import Plane
 from sfm_front.evaluation.retrieval.figures.writing import NUM_QUERIES, FigureWriter, shown_queries
@@ -70,7 +70,7 @@ def test_the_first_layer_of_each_network(tmp_path, name, kernels, responses):
 def test_figures_of_a_run(tmp_path):
     pytest.importorskip("matplotlib")
     world = small_dataset(tmp_path)
-    describer = BenchDescriber(tmp_path / "cache", {}, max_features=200)
+    describer = BenchExtraction(tmp_path / "cache", {}, max_features=200)
     made = describe([world], describer, lambda _: None)
     rng = np.random.default_rng(0)
     vectors = {"v": unit_length(rng.normal(size=(9, 64)).astype(np.float32))}

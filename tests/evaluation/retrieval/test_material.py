@@ -8,7 +8,7 @@ import pytest
 from helpers.bench_photos import query, small_dataset
 
 from sfm_front.errors import InputError
-from sfm_front.evaluation.retrieval.describe import BenchDescriber
+from sfm_front.evaluation.retrieval.describe import BenchExtraction
 from sfm_front.evaluation.retrieval.material import describe, key_of, sampled
 from sfm_front.evaluation.retrieval.types import Dataset
 
@@ -21,7 +21,9 @@ def world(tmp_path):
 @pytest.fixture
 def material(world, tmp_path):
     notes = []
-    made = describe([world], BenchDescriber(tmp_path / "cache", {}, max_features=200), notes.append)
+    made = describe(
+        [world], BenchExtraction(tmp_path / "cache", {}, max_features=200), notes.append
+    )
     return made, notes
 
 
@@ -43,13 +45,13 @@ def test_nothing_to_search_is_refused(tmp_path):
     (tmp_path / "broken.png").write_bytes(b"no image")
     dataset = Dataset("bad", {"broken.png": tmp_path / "broken.png"}, ())
     with pytest.raises(InputError, match="bad: none of its 1 photos can be used"):
-        describe([dataset], BenchDescriber(tmp_path / "cache", {}), lambda _: None)
+        describe([dataset], BenchExtraction(tmp_path / "cache", {}), lambda _: None)
 
 
 def test_nothing_to_ask_is_refused(world, tmp_path):
     last = replace(world, queries=world.queries[-1:])
     with pytest.raises(InputError, match="small: none of its queries can be used"):
-        describe([last], BenchDescriber(tmp_path / "cache", {}, max_features=50), lambda _: None)
+        describe([last], BenchExtraction(tmp_path / "cache", {}, max_features=50), lambda _: None)
 
 
 def test_queries_are_sampled_in_their_order_and_always_the_same():

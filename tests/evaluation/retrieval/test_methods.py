@@ -10,7 +10,7 @@ import pytest
 from helpers import photo_files
 
 from sfm_front.errors import ConfigError
-from sfm_front.evaluation.retrieval.describe import BenchDescriber
+from sfm_front.evaluation.retrieval.describe import BenchExtraction
 from sfm_front.evaluation.retrieval.methods import METHODS, make_method
 from sfm_front.evaluation.retrieval.methods.bag_of_words import BagOfWords, InvertedFile
 from sfm_front.evaluation.retrieval.methods.hierarchical import Hierarchical
@@ -26,7 +26,7 @@ from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked, Staged
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.retrieval.retriever import RetrievalOptions
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 
 NETWORKS = ("alexnet_fc7", "resnet101_pool5", "mobilenet_v2")
 BY_LOCAL_FEATURES = (
@@ -42,7 +42,7 @@ class World:
         names = [f"{scene}_{shift}.png" for scene in (1, 2, 3) for shift in (0, 60, 120)]
         paths = photo_files.save(folder / "photos", *names)
         outside = photo_files.save(folder / "outside", "2_30.png")
-        describer = BenchDescriber(
+        describer = BenchExtraction(
             folder / "cache", {"vlad": GlobalDescriptor(local=[Vlad()])}, max_features=400
         )
         self.by_name = describer.photos({path.name: path for path in paths}).photos
@@ -60,8 +60,8 @@ def world(tmp_path_factory) -> World:
 
 
 @pytest.fixture
-def workers() -> Iterator[Workers]:
-    with Workers(1) as workers:
+def workers() -> Iterator[WorkerPool]:
+    with WorkerPool(1) as workers:
         yield workers
 
 

@@ -15,19 +15,19 @@ from sfm_front.evaluation.retrieval.methods.perceptual import ByPerceptualHash
 from sfm_front.evaluation.retrieval.methods.vocabulary_tree import VocabularyTree
 from sfm_front.evaluation.retrieval.types import Method
 from sfm_front.features.global_descriptors.descriptor import NAMES
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 
 NUM_TREES = 3
 """Vocabulary trees that vote together, each learnt on other descriptors."""
 
-Maker = Callable[[Workers], Method]
+Maker = Callable[[WorkerPool], Method]
 
 
 def _by_vector(name: str) -> Maker:
     return lambda _: ByVector(name)
 
 
-def _several_trees(workers: Workers) -> Method:
+def _several_trees(workers: WorkerPool) -> Method:
     trees = [VocabularyTree(seed=s, num_threads=workers.num_threads) for s in range(NUM_TREES)]
     return Joined("multi_vocabulary_tree", trees)
 
@@ -46,7 +46,7 @@ METHODS: Mapping[str, Maker] = MappingProxyType(
 """What makes each method with its own defaults."""
 
 
-def make_method(name: str, workers: Workers) -> Method:
+def make_method(name: str, workers: WorkerPool) -> Method:
     """The method called ``name``, which may use these threads.
 
     Raises ConfigError for no such name.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
-from sfm_front.matching.nearest_neighbors import MatchingOptions, match
+from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors
 from sfm_front.matching.verification import Verifier, View
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 
 
 class Exhaustive:
@@ -16,7 +16,7 @@ class Exhaustive:
     name = "exhaustive"
     global_vectors = ()
 
-    def __init__(self, workers: Workers) -> None:
+    def __init__(self, workers: WorkerPool) -> None:
         self._matching = MatchingOptions()
         self._verifier = Verifier()
         self._workers = workers
@@ -26,7 +26,7 @@ class Exhaustive:
 
     def rank(self, query: BenchPhoto) -> list[Ranked]:
         def compare(other: View) -> Ranked:
-            matches = match(
+            matches = match_descriptors(
                 query.view.features.descriptors, other.features.descriptors, self._matching
             )
             inliers = self._verifier.count_inliers(query.view, other, matches)

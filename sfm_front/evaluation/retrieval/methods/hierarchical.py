@@ -16,7 +16,7 @@ from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.runtime.stopwatch import Stopwatch
-from sfm_front.runtime.worker_pool import Workers
+from sfm_front.runtime.worker_pool import WorkerPool
 
 
 class Hierarchical:
@@ -26,7 +26,7 @@ class Hierarchical:
 
     def __init__(
         self,
-        workers: Workers,
+        workers: WorkerPool,
         *,
         vector: str = Vlad.name,
         retrieval: RetrievalOptions | None = None,
