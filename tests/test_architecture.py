@@ -85,9 +85,8 @@ class Import:
 
 
 def read_imports(package: Path) -> list[Import]:
-    """All imports below ``package``: at the top, in functions, for types only, by name.
+    """All imports below ``package``, also in functions, for types only or by ``import_module``.
 
-    By name is ``import_module("...")``.
     ``from package import name`` imports ``package.name`` if that is a module, else ``package``.
     """
     files = {_module_name(package, file): file for file in sorted(package.rglob("*.py"))}
