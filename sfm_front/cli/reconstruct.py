@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, help="photos, sub-folders included")
     parser.add_argument(
         "--output",
-        type=Path,
+        type=_folder,
         help="where to write (default: outputs/NAME, by the folder's name, or by its parent's "
         "if it is called images)",
     )
@@ -94,6 +94,12 @@ def run(arguments: argparse.Namespace) -> int:
         progress.end()
         print(closing_summary(session.report, output))
     return 0 if models else 1
+
+
+def _folder(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("give a folder, or leave --output out")
+    return Path(text)
 
 
 def default_output(folder: Path) -> Path:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pycolmap
 
-from sfm_front.errors import InputError
 from sfm_front.exporters.colmap import export_models
 from sfm_front.features.colmap_sift import ColmapSift
 from sfm_front.features.extraction import FeatureExtraction, FeatureExtractor
@@ -31,6 +29,7 @@ from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.options import SessionOptions
+from sfm_front.session.output_folder import check_output_folder, make_output_folder
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import (
@@ -43,8 +42,6 @@ from sfm_front.types import (
     StepReport,
     Uint32Array,
 )
-
-_OUTPUTS = ("database.db", "database.db-shm", "database.db-wal", "retrieval.jsonl", "report.json")
 
 
 class Session(Closeable):
@@ -71,22 +68,13 @@ class Session(Closeable):
         """
         self.options = options or SessionOptions()
         self.output = output
-        database = output / "database.db"
-        if output.exists() and not output.is_dir():
-            raise InputError(f"{output}: not a folder. Give another --output.")
-        if database.exists() and not overwrite:
-            raise InputError(
-                f"{output}: holds a reconstruction already. Give another --output, "
-                "or --overwrite to replace it."
-            )
+        check_output_folder(output, overwrite=overwrite)
         device, on_device = usable_device(self.options.device)
         descriptor, on_descriptor = resolve(
             self.options.global_descriptor, weights=self.options.weights, device=device
         )
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
-        if overwrite:
-            _clear(output)
-        output.mkdir(parents=True, exist_ok=True)
+        make_output_folder(output, overwrite=overwrite)
         threads = self.options.threads
         self._describer = FeatureExtraction(
             PhotoReader(max_image_size=self.options.max_image_size),
@@ -108,7 +96,7 @@ class Session(Closeable):
         )
         self._duplicates = DuplicateFinder()
         self._cameras = CameraCatalog(self.options.cameras)
-        self._database = PhotoDatabase(database)
+        self._database = PhotoDatabase(output / "database.db")
         self._view_graph = ViewGraph()
         self._atlas = Atlas(self._view_graph, self.options.atlas)
         self._views: dict[int, View] = {}
@@ -242,10 +230,3 @@ def _extractor(device: str, max_features: int) -> FeatureExtractor:
     if device == "cuda" and pycolmap.has_cuda:
         return ColmapSift(max_features)
     return SiftExtractor(max_features)
-
-
-def _clear(output: Path) -> None:
-    for name in _OUTPUTS:
-        (output / name).unlink(missing_ok=True)
-    for folder in output.glob("sparse*"):
-        shutil.rmtree(folder, ignore_errors=True)

@@ -165,6 +165,7 @@ def test_weights_that_are_not_there(photo, tmp_path, capsys):
 def test_an_output_that_holds_a_reconstruction(photo, tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "database.db").write_bytes(b"kept")
+    (tmp_path / "out" / "retrieval.jsonl").touch()
     line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out")
     assert "holds a reconstruction already" in line
     assert (tmp_path / "out" / "database.db").read_bytes() == b"kept"
@@ -180,6 +181,7 @@ def test_an_output_that_is_a_file(photo, tmp_path, capsys):
 def test_a_wrong_option_does_not_cost_the_reconstruction_that_is_there(photo, tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "database.db").write_bytes(b"kept")
+    (tmp_path / "out" / "retrieval.jsonl").touch()
     refused(
         capsys,
         *("reconstruct", photo, "--output", tmp_path / "out", "--overwrite"),

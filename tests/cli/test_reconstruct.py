@@ -214,6 +214,7 @@ def test_overwrite_replaces_what_a_session_wrote_and_nothing_else(five, tmp_path
     output.mkdir()
     (output / "notes.txt").write_text("mine")
     (output / "database.db").write_bytes(b"of an earlier session")
+    (output / "retrieval.jsonl").touch()
     (output / "sparse" / "7").mkdir(parents=True)
     for photo in sorted(five.iterdir())[2:]:
         photo.unlink()

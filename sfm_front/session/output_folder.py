@@ -1,0 +1,108 @@
+"""The folder a session writes to: what is in it, and what of that may be replaced."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from sfm_front.errors import InputError
+
+_MARKER = "retrieval.jsonl"
+_FILES = ("database.db", "database.db-shm", "database.db-wal", "report.json", _MARKER)
+_MODELS = ("sparse", "sparse.new", "sparse.old")
+_MODEL_NAME = re.compile(r"\d+")
+_MODEL_FILES = frozenset(
+    {
+        "points3D.ply",
+        *(
+            f"{part}{suffix}"
+            for part in ("cameras", "frames", "images", "points3D", "rigs")
+            for suffix in (".bin", ".txt")
+        ),
+    }
+)
+
+
+def check_output_folder(output: Path, *, overwrite: bool) -> None:
+    """Raise InputError unless a session may write to ``output``. Changes nothing.
+
+    An output is a session's own if ``retrieval.jsonl``, which every session begins with, is in it.
+    Only such an output is replaced, and only if its model folders hold nothing but model files.
+    """
+    if output.exists() and not output.is_dir():
+        raise InputError(f"{output}: not a folder. Give another --output.")
+    taken = [name for name in (*_FILES, *_MODELS) if _is_there(output / name)]
+    if not taken:
+        return
+    if not _is_own_file(output / _MARKER):
+        raise InputError(
+            f"{output}: holds {taken[0]}, which this tool did not write. "
+            "Move it away, or give another --output."
+        )
+    if not overwrite:
+        raise InputError(
+            f"{output}: holds a reconstruction already. Give another --output, "
+            "or --overwrite to replace it."
+        )
+    for foreign in _foreign(output):
+        raise InputError(
+            f"{foreign}: lies where --overwrite would remove it, and this tool did not write it. "
+            "Move it away, or give another --output."
+        )
+
+
+def make_output_folder(output: Path, *, overwrite: bool) -> None:
+    """Make an empty output of a folder that ``check_output_folder`` has passed.
+
+    Removes what an earlier session wrote if ``overwrite``. Raises InputError if the folder cannot
+    be made or written to.
+    """
+    check_output_folder(output, overwrite=overwrite)
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        # Try before removing anything: a read-only output must stay as it is.
+        probe = output / ".sfm_front_probe"
+        probe.touch()
+        probe.unlink()
+        for name in _MODELS:
+            if (output / name).is_dir():
+                shutil.rmtree(output / name)
+        # The marker goes last: what an interrupted removal leaves can still be replaced.
+        for name in _FILES:
+            (output / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{output}: cannot be written to ({error.strerror}). Give another --output."
+        ) from error
+
+
+def _is_there(path: Path) -> bool:
+    return path.exists() or path.is_symlink()
+
+
+def _is_own_file(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink()
+
+
+def _foreign(output: Path) -> Iterator[Path]:
+    """What a session would not have written, in the places that are removed."""
+    for name in _FILES:
+        path = output / name
+        if _is_there(path) and not _is_own_file(path):
+            yield path
+    for name in _MODELS:
+        folder = output / name
+        if not _is_there(folder):
+            continue
+        if folder.is_symlink() or not folder.is_dir():
+            yield folder
+            continue
+        for model in folder.iterdir():
+            if model.is_symlink() or not model.is_dir() or not _MODEL_NAME.fullmatch(model.name):
+                yield model
+                continue
+            for file in model.iterdir():
+                if file.name not in _MODEL_FILES or not _is_own_file(file):
+                    yield file

@@ -1,0 +1,113 @@
+"""Nothing is removed or overwritten that a session did not write itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sfm_front.errors import InputError
+from sfm_front.session.output_folder import check_output_folder, make_output_folder
+
+
+def finished(folder: Path) -> Path:
+    """An output as a session leaves it, with one model."""
+    model = folder / "sparse" / "0"
+    model.mkdir(parents=True)
+    for name in ("cameras.bin", "images.bin", "points3D.bin", "points3D.ply"):
+        (model / name).write_bytes(b"model")
+    for name in ("database.db", "retrieval.jsonl", "report.json"):
+        (folder / name).write_bytes(b"output")
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes | None]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+def put(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"precious")
+    return path
+
+
+def test_overwriting_removes_a_finished_output_and_nothing_beside_it(tmp_path):
+    output = finished(tmp_path)
+    kept = [put(output / name) for name in ("photo.jpg", "sparse woods/p.jpg", "sparse_mine/x")]
+    make_output_folder(output, overwrite=True)
+    left = {path for path in output.rglob("*") if path.is_file()}
+    assert left == set(kept)
+
+
+def test_an_output_is_not_overwritten_unasked(tmp_path):
+    output = finished(tmp_path)
+    before = contents(output)
+    with pytest.raises(InputError, match="holds a reconstruction already"):
+        make_output_folder(output, overwrite=False)
+    assert contents(output) == before
+
+
+@pytest.mark.parametrize(
+    "foreign",
+    ["sparse/0/photo.jpg", "sparse/by_hand/cameras.bin", "sparse/photo.jpg", "sparse.old/a/b"],
+)
+def test_overwriting_refuses_model_folders_that_hold_other_files(tmp_path, foreign):
+    output = finished(tmp_path)
+    put(output / foreign)
+    before = contents(output)
+    with pytest.raises(InputError, match="Move it away"):
+        make_output_folder(output, overwrite=True)
+    assert contents(output) == before
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("theirs", ["sparse/0/cameras.bin", "database.db", "report.json"])
+def test_a_project_of_another_tool_is_refused(tmp_path, theirs, overwrite):
+    """COLMAP's own projects have database.db and sparse/0, too."""
+    put(tmp_path / theirs)
+    before = contents(tmp_path)
+    with pytest.raises(InputError, match="did not write"):
+        make_output_folder(tmp_path, overwrite=overwrite)
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", ["retrieval.jsonl", "report.json", "database.db"])
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_links_to_other_files_are_refused(tmp_path, name, overwrite):
+    theirs = put(tmp_path / "theirs.txt")
+    output = finished(tmp_path / "output")
+    (output / name).unlink()
+    (output / name).symlink_to(theirs)
+    with pytest.raises(InputError):
+        make_output_folder(output, overwrite=overwrite)
+    assert theirs.read_bytes() == b"precious"
+    assert (output / name).is_symlink()
+
+
+def test_a_linked_model_folder_is_refused(tmp_path):
+    theirs = put(tmp_path / "theirs" / "0" / "cameras.bin")
+    output = finished(tmp_path / "output")
+    (output / "sparse.old").symlink_to(tmp_path / "theirs")
+    with pytest.raises(InputError, match=r"sparse\.old"):
+        make_output_folder(output, overwrite=True)
+    assert theirs.is_file()
+
+
+def test_a_folder_where_a_file_belongs_is_refused(tmp_path):
+    (tmp_path / "retrieval.jsonl").mkdir()
+    with pytest.raises(InputError, match=r"retrieval\.jsonl"):
+        make_output_folder(tmp_path, overwrite=True)
+
+
+def test_what_an_interrupted_removal_left_can_be_replaced(tmp_path):
+    (finished(tmp_path) / "database.db").unlink()
+    check_output_folder(tmp_path, overwrite=True)
+
+
+def test_a_parent_that_is_a_file_is_named(tmp_path):
+    below = put(tmp_path / "file") / "output"
+    with pytest.raises(InputError, match="cannot be written to"):
+        make_output_folder(below, overwrite=False)
