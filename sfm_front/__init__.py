@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+# pycolmap's wheels export a zlib of their own; loaded before Python's, it breaks compression in
+# the whole process.
+import zlib  # noqa: F401
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

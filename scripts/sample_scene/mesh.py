@@ -158,7 +158,8 @@ def local_frame(x: float, y: float, z: float, yaw: float) -> Floats:
 
 def to_world(frame: Floats, points: NDArray[np.floating]) -> Floats:
     """Local points (N, 3) in the world."""
-    return (points @ frame[:, :3].T + frame[:, 3]).astype(np.float32)
+    moved: Floats = (points @ frame[:, :3].T + frame[:, 3]).astype(np.float32)
+    return moved
 
 
 def grid_triangles(rows: int, columns: int) -> Triangles:

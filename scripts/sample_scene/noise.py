@@ -35,7 +35,8 @@ def unit(hashes: Hashes, draw: int = 0) -> Floats:
     """The ``draw``-th independent number in [0, 1) of each hash."""
     if draw:
         hashes = _mix(hashes + np.uint32((draw * 0x85EBCA6B) & 0xFFFFFFFF))
-    return (hashes >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+    noise: Floats = (hashes >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+    return noise
 
 
 def value_noise(points: Floats, seed: int) -> Floats:
@@ -76,7 +77,8 @@ def fractal(
         cell *= 0.5
         turned[:, :2] = turned[:, :2] @ turn
     # Octaves are independent, so their deviations add up as squares do.
-    return total / np.float32(1.4 * np.sqrt(norm))
+    scaled: Floats = total / np.float32(1.4 * np.sqrt(norm))
+    return scaled
 
 
 def spots(points: Floats, seed: int, *, cell: float, share: float) -> tuple[Floats, Hashes]:

@@ -22,7 +22,8 @@ def add_retrieval(group: argparse._ActionsContainer) -> None:
     group.add_argument(
         "--global-descriptor",
         metavar="NAME",
-        help="vlad, resnet101_pool5, alexnet_fc7, mobilenet_v2, two joined by +, or auto (default)",
+        help="vlad, resnet101_pool5, alexnet_fc7, mobilenet_v2, two joined by + (VLAD weighs "
+        "0.8, the network 0.2, measured with mobilenet_v2 only), or auto (default)",
     )
     group.add_argument("--weights", type=Path, metavar="FILE", help="of the network")
     group.add_argument("--candidates", type=int, metavar="N", help="photos re-ranked (default: 25)")

@@ -111,14 +111,10 @@ def default_output(folder: Path) -> Path:
 
 def session_options(arguments: argparse.Namespace) -> SessionOptions:
     """What was given on the command line; the rest is the session's default."""
-    from sfm_front.mapping.atlas import AtlasOptions
-    from sfm_front.mapping.model import MapperOptions
-    from sfm_front.matching.verification import VerificationOptions
     from sfm_front.photos.cameras import CameraOptions
-    from sfm_front.session.options import SessionOptions, available_cores
+    from sfm_front.session.options import SessionOptions
 
     given = shared.given(arguments, "num_matched")
-    threads = given.setdefault("threads", available_cores())
     cameras = {
         "mode": arguments.camera_mode,
         "model": arguments.camera_model,
@@ -128,8 +124,7 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
         **given,
         text=arguments.text,
         cameras=CameraOptions(**{k: v for k, v in cameras.items() if v is not None}),
-        verification=VerificationOptions(seed=arguments.seed),
-        atlas=AtlasOptions(mapper=MapperOptions(num_threads=threads, seed=arguments.seed)),
+        seed=arguments.seed,
     )
 
 

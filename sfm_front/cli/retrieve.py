@@ -144,15 +144,19 @@ def _options(arguments: argparse.Namespace) -> tuple[SessionOptions, SearchOptio
 
     session = SessionOptions(**shared.given(arguments))
     search = SearchOptions(
-        method=arguments.method, retrieval=session.retrieval, rerank=session.rerank
+        method=arguments.method,
+        retrieval=session.retrieval,
+        rerank=session.rerank,
+        matching=session.matching,
+        verification=session.verification,
     )
     return session, search
 
 
 def _describer(options: SessionOptions, location: Path, device: str) -> CachedExtraction:
     from sfm_front.features.cached_extraction import CachedExtraction
+    from sfm_front.features.extraction import make_extractor
     from sfm_front.features.global_descriptors.descriptor import resolve
-    from sfm_front.features.sift import SiftExtractor
     from sfm_front.photos.reader import PhotoReader
 
     descriptor, message = resolve(options.global_descriptor, weights=options.weights, device=device)
@@ -161,7 +165,7 @@ def _describer(options: SessionOptions, location: Path, device: str) -> CachedEx
     return CachedExtraction(
         location,
         PhotoReader(max_image_size=options.max_image_size),
-        SiftExtractor(options.max_features),
+        make_extractor(device, options.max_features),
         {descriptor.name: descriptor},
     )
 

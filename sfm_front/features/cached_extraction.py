@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sfm_front.features.colmap_sift import ColmapSift
 from sfm_front.features.feature_cache import (
     Box,
     CachedFeatures,
@@ -41,7 +42,7 @@ class CachedExtraction:
         self,
         folder: Path,
         reader: PhotoReader,
-        sift: SiftExtractor,
+        sift: SiftExtractor | ColmapSift,
         descriptors: Mapping[str, GlobalDescriptor],
     ) -> None:
         self.files = FeatureCache(folder)
@@ -51,6 +52,7 @@ class CachedExtraction:
         self.settings = ExtractionSettings(
             reader.max_image_size,
             reader.min_image_size,
+            sift.name,
             sift.max_features,
             tuple(descriptor.fingerprint for descriptor in self._descriptors.values()),
         )

@@ -14,9 +14,12 @@ from sfm_front.types import Features, Float32Array, Photo
 class ColmapSift:
     """Finds the SIFT keypoints of a photo. Safe to share between threads, which take turns."""
 
+    name = "colmap-sift"
+
     def __init__(self, max_features: int = 4000, *, on_gpu: bool = True) -> None:
         """``max_features``: keypoints sought, those of largest scale first; COLMAP keeps the level
         of scale in which it reaches them whole."""
+        self.max_features = max_features
         options = pycolmap.FeatureExtractionOptions()
         options.use_gpu = on_gpu
         options.num_threads = 1

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 from weakref import WeakSet
 
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
+from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.photos.source import PhotoPath
 from sfm_front.runtime.closeable import Closeable
@@ -15,11 +16,32 @@ from sfm_front.runtime.prefetch import prefetch
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.types import ExtractedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
 
+if TYPE_CHECKING:
+    from sfm_front.features.colmap_sift import ColmapSift
+
 
 class FeatureExtractor(Protocol):
-    """Finds the SIFT features of a photo; threads may share it."""
+    """Finds the SIFT features of a photo; threads may share it.
+
+    ``name`` tells apart extractors whose features must not be mixed.
+    """
+
+    @property
+    def name(self) -> str: ...
 
     def extract(self, photo: Photo) -> Features: ...
+
+
+def make_extractor(device: str, max_features: int) -> SiftExtractor | ColmapSift:
+    """SIFT for a device that ``devices.usable_device`` has given: COLMAP's on a GPU if it can."""
+    if device == "cuda":
+        import pycolmap
+
+        from sfm_front.features.colmap_sift import ColmapSift
+
+        if pycolmap.has_cuda:
+            return ColmapSift(max_features)
+    return SiftExtractor(max_features)
 
 
 class FeatureExtraction(Closeable):

@@ -22,9 +22,12 @@ from sfm_front.types import Exif, Features, Float32Array, GeoPosition
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom in pixels of the file."""
 
-_FORMAT = 1
+_FORMAT = 2
 _DECISIVE_CODE = (
     "photos/decoding.py",
+    "photos/exif.py",
+    "photos/formats.py",
+    "features/colmap_sift.py",
     "features/sift.py",
     "features/global_descriptors/vlad.py",
     "features/global_descriptors/visual_words.py",
@@ -62,6 +65,7 @@ class ExtractionSettings:
 
     max_image_size: int
     min_image_size: int
+    extractor: str
     max_features: int
     fingerprints: tuple[str, ...]
 
@@ -74,6 +78,7 @@ class ExtractionSettings:
             cv2.__version__,
             self.max_image_size,
             self.min_image_size,
+            self.extractor,
             self.max_features,
             digest,
             box,

@@ -27,6 +27,8 @@ class SiftExtractor:
     three of those before it.
     """
 
+    name = "opencv-sift"
+
     def __init__(self, max_features: int = 4000) -> None:
         """``max_features``: places kept a photo; one with several orientations counts once, as
         in COLMAP. Raises ConfigError if it is below 1.

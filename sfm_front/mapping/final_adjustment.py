@@ -22,11 +22,13 @@ _MIN_GAIN = 0.035
 class FinalAdjustmentOptions:
     """``loss_scale_px``: reprojection error from which the Cauchy loss gives way.
     ``refine_intrinsics``: whether focal length and distortion may move, and the principal
-    point of a camera nothing is known of."""
+    point of a camera nothing is known of. ``large_from``: registered photos from which the
+    adjustment goes on for long, as in ``ScheduleOptions``."""
 
     loss_scale_px: float = 1.0
     refine_intrinsics: bool = True
     num_threads: int = 2
+    large_from: int = LARGE
 
 
 def final_adjustment(
@@ -86,7 +88,7 @@ def _adjust(
     adjustment.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     adjustment.ceres.loss_function_scale = options.loss_scale_px
     # 400 synthetic photos ended at a pose AUC of 0.80 at 1° with 1e-4, at 0.94 with 1e-6.
-    large = reconstruction.num_reg_images() >= LARGE
+    large = reconstruction.num_reg_images() >= options.large_from
     adjustment.ceres.solver_options.function_tolerance = 1e-6 if large else 1e-4
     adjustment.ceres.solver_options.num_threads = options.num_threads
     config = pycolmap.BundleAdjustmentConfig()

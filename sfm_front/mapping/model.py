@@ -10,7 +10,7 @@ import pycolmap
 from sfm_front.errors import ConfigError
 from sfm_front.mapping.final_adjustment import FinalAdjustmentOptions, final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
-from sfm_front.mapping.refinement_schedule import LARGE, RefinementSchedule, ScheduleOptions
+from sfm_front.mapping.refinement_schedule import RefinementSchedule, ScheduleOptions
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.runtime.stopwatch import Stopwatch
 
@@ -64,7 +64,9 @@ class MapperOptions:
         as 1e-6. With 1e-5 the flight stayed bent: pose AUC at 1° 0.59 for 0.80.
         """
         options = pycolmap.IncrementalPipelineOptions()
-        options.ba_global_function_tolerance = 1e-6 if num_photos >= LARGE else 1e-5
+        options.ba_global_function_tolerance = (
+            1e-6 if num_photos >= self.schedule.large_from else 1e-5
+        )
         options.num_threads = self.num_threads
         options.random_seed = self.seed
         options.ba_refine_focal_length = self.refine_intrinsics
@@ -210,11 +212,15 @@ class Model:
             FinalAdjustmentOptions(
                 refine_intrinsics=self._options.refine_intrinsics,
                 num_threads=self._options.num_threads,
+                large_from=self._options.schedule.large_from,
             ),
         )
         if not self.is_miscalibrated:
             for image_id in self._impossible():
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
+        # What is asked of the mapper from here on must be of the model that is handed out.
+        self._mapper.end_reconstruction(False)
+        self._mapper.begin_reconstruction(self.reconstruction)
 
     @property
     def is_miscalibrated(self) -> bool:

@@ -90,7 +90,8 @@ def _captured_at(tags: Mapping[int, Any]) -> datetime | None:
             continue
         fraction = _text(tags.get(fraction_tag))
         if fraction.isascii() and fraction.isdigit():
-            when += timedelta(seconds=float(f"0.{fraction}"))
+            # Six digits: rounding up could leave the calendar.
+            when += timedelta(microseconds=int(fraction[:6].ljust(6, "0")))
         return when
     return None
 

@@ -114,7 +114,7 @@ class CosineIndex:
         return cosines
 
     def _expanded(self, vector: Float32Array, rows: Iterable[int]) -> Float32Array:
-        wider = vector.copy()
+        wider: Float32Array = vector.copy()
         for row in rows:
             other = np.asarray(self._vectors.reconstruct(row)) * self._peaks[row]
             wider += max(0.0, float(vector @ other)) * other

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from sfm_front.errors import ConfigError
 from sfm_front.matching.matcher import make_matcher
 from sfm_front.matching.nearest_neighbors import NO_MATCHES, MatchingOptions, match_descriptors
-from sfm_front.matching.verification import Verifier
+from sfm_front.matching.verification import VerificationOptions, Verifier
 from sfm_front.photos.source import PhotoPath
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
@@ -38,6 +38,8 @@ class SearchOptions:
     method: SearchMethod = "ours"
     retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
     rerank: RerankOptions = field(default_factory=RerankOptions)
+    matching: MatchingOptions = field(default_factory=MatchingOptions)
+    verification: VerificationOptions = field(default_factory=VerificationOptions)
 
     def __post_init__(self) -> None:
         if self.method not in get_args(SearchMethod):
@@ -89,8 +91,8 @@ class FolderSearch:
         self._index = index
         self._options = options
         self._workers = workers
-        self._matching = MatchingOptions()
-        self._verifier = Verifier()
+        self._matching = options.matching
+        self._verifier = Verifier(options.verification)
         matcher = make_matcher(device, self._matching, workers)
         self._reranker = Reranker(self._rerank_options(), matcher, self._verifier, workers)
         vectors = workers.map(index.vector, index.photos)

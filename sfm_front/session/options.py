@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sfm_front.errors import ConfigError
@@ -34,7 +34,7 @@ class SessionOptions:
     ``second_rerank``: at those of which it told too little.
     ``num_matched``: re-ranked photos that are matched on all features. ``num_matched_first``:
     number of top candidates matched without guidance; the pose they yield guides the rest.
-    ``threads``: cores to use.
+    ``threads``: cores to use. ``seed``: of all RANSAC. Both reach every part from here.
     ``text``: write models in COLMAP's text form too.
     """
 
@@ -47,6 +47,7 @@ class SessionOptions:
     num_matched_first: int = 3
     text: bool = False
     threads: int = field(default_factory=available_cores)
+    seed: int = 0
     cameras: CameraOptions = field(default_factory=CameraOptions)
     retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
     rerank: RerankOptions = field(default_factory=RerankOptions)
@@ -63,6 +64,11 @@ class SessionOptions:
             raise ConfigError(f"num_matched_first must be at least 1, got {self.num_matched_first}")
         if self.threads < 1:
             raise ConfigError(f"threads must be at least 1, got {self.threads}")
+        mapper = replace(self.atlas.mapper, num_threads=self.threads, seed=self.seed)
+        localization = replace(self.atlas.localization, seed=self.seed)
+        atlas = replace(self.atlas, mapper=mapper, localization=localization)
+        object.__setattr__(self, "atlas", atlas)
+        object.__setattr__(self, "verification", replace(self.verification, seed=self.seed))
         # These check themselves: here, so that it is done before a session has written anything.
         PhotoReader(max_image_size=self.max_image_size)
         SiftExtractor(self.max_features)

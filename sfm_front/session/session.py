@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-import pycolmap
-
 from sfm_front.exporters.colmap import export_models
-from sfm_front.features.colmap_sift import ColmapSift
-from sfm_front.features.extraction import FeatureExtraction, FeatureExtractor
-from sfm_front.features.global_descriptors.descriptor import resolve
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.extraction import FeatureExtraction, make_extractor
+from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, resolve
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.matching.guided_matching import GuidedMatcher
@@ -75,14 +72,23 @@ class Session(Closeable):
         )
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         make_output_folder(output, overwrite=overwrite)
-        threads = self.options.threads
+        # What is open is closed again if a later part cannot be made.
+        with ExitStack() as opened:
+            self._open(opened, device, descriptor)
+            self._opened = opened.pop_all()
+        self._finished = False
+
+    def _open(self, opened: ExitStack, device: str, descriptor: GlobalDescriptor) -> None:
+        output, threads = self.output, self.options.threads
         self._describer = FeatureExtraction(
             PhotoReader(max_image_size=self.options.max_image_size),
-            _extractor(device, self.options.max_features),
+            make_extractor(device, self.options.max_features),
             descriptor,
             num_threads=threads,
         )
+        opened.callback(self._describer.close)
         self._workers = WorkerPool(threads)
+        opened.callback(self._workers.close)
         self._verifier = Verifier(self.options.verification)
         matcher = make_matcher(device, self.options.matching, self._workers)
         self._reranker, second_rerank = (
@@ -97,11 +103,13 @@ class Session(Closeable):
         self._duplicates = DuplicateFinder()
         self._cameras = CameraCatalog(self.options.cameras)
         self._database = PhotoDatabase(output / "database.db")
+        opened.callback(self._database.close)
         self._view_graph = ViewGraph()
         self._atlas = Atlas(self._view_graph, self.options.atlas)
         self._views: dict[int, View] = {}
         self._names: dict[int, str] = {}
         self._report = Report(output)
+        opened.callback(self._report.close)
 
     def add(self, path: Path, name: str | None = None) -> StepReport:
         """Take in one photo; ``name`` is what it is called in the models (default: the file's)."""
@@ -113,7 +121,12 @@ class Session(Closeable):
             yield self.add_extracted(described)
 
     def add_extracted(self, photo: ExtractedPhoto | Skipped) -> StepReport:
-        """Take in a photo that is described already."""
+        """Take in a photo whose features are extracted already.
+
+        Raises RuntimeError once the session is finished: its models are final.
+        """
+        if self._finished:
+            raise RuntimeError("the session is finished: begin another one for more photos")
         if isinstance(photo, ExtractedPhoto):
             photo = self._duplicates.check(photo.name, photo.digest) or photo
         if isinstance(photo, Skipped):
@@ -125,6 +138,9 @@ class Session(Closeable):
 
     def finish(self) -> list[ModelSummary]:
         """Place what can still be placed, refine, and export all models, the largest first."""
+        if self._finished:
+            raise RuntimeError("the session is finished already")
+        self._finished = True
         clock = Stopwatch()
         with clock.stage("finish"):
             self._atlas.finish()
@@ -144,10 +160,7 @@ class Session(Closeable):
         return models
 
     def close(self) -> None:
-        self._describer.close()
-        self._workers.close()
-        self._database.close()
-        self._report.close()
+        self._opened.close()
 
     def _place(self, photo: ExtractedPhoto) -> StepReport:
         """The method: retrieve, verify, store, map, remember."""
@@ -224,9 +237,3 @@ class Session(Closeable):
         found = {pair.image_id2 for pair in guided}
         left = [candidate for candidate in candidates if candidate.image_id not in found]
         return guided + self._match(view, left, clock)
-
-
-def _extractor(device: str, max_features: int) -> FeatureExtractor:
-    if device == "cuda" and pycolmap.has_cuda:
-        return ColmapSift(max_features)
-    return SiftExtractor(max_features)

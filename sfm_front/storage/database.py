@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ class PhotoDatabase(Closeable):
 
     def __init__(self, path: Path) -> None:
         """Open the database at ``path``, or make it."""
+        self._path = path
         self._database = pycolmap.Database.open(path)
 
     def write(
@@ -27,10 +30,24 @@ class PhotoDatabase(Closeable):
         camera: pycolmap.Camera,
         pairs: Sequence[PairGeometry],
     ) -> None:
-        """Write a photo with all that is known of it, in one transaction.
+        """Write a photo with all that is known of it, or nothing of it if this raises.
 
         Ids are those given: frames have their image's id, rigs their camera's.
         """
+        try:
+            self._write(image_id, photo, camera, pairs)
+        except BaseException:
+            # pycolmap's transaction commits even then; COLMAP's database knows no rollback.
+            _remove(self._path, image_id)
+            raise
+
+    def _write(
+        self,
+        image_id: int,
+        photo: ExtractedPhoto,
+        camera: pycolmap.Camera,
+        pairs: Sequence[PairGeometry],
+    ) -> None:
         database = self._database
         with pycolmap.DatabaseTransaction(database):
             if not database.exists_camera(camera.camera_id):
@@ -46,8 +63,9 @@ class PhotoDatabase(Closeable):
                     type=pycolmap.FeatureExtractorType.SIFT, data=photo.features.descriptors
                 ),
             )
-            if photo.exif.position is not None:
-                database.write_pose_prior(_pose_prior(image, photo.exif.position))
+            position = photo.exif.position
+            if position is not None and position.altitude_m is not None:
+                database.write_pose_prior(_pose_prior(image, position, position.altitude_m))
             for pair in pairs:
                 ids = pair.image_id1, pair.image_id2
                 database.write_matches(*ids, pair.matches)
@@ -57,11 +75,29 @@ class PhotoDatabase(Closeable):
         self._database.close()
 
 
-def _pose_prior(image: pycolmap.Image, position: GeoPosition) -> pycolmap.PosePrior:
-    """COLMAP's WGS84 prior: latitude and longitude in degrees, altitude in metres."""
+def _remove(path: Path, image_id: int) -> None:
+    """Remove the rows of a photo and of its pairs. Its camera may stay: others can share it."""
+    with closing(sqlite3.connect(path)) as connection, connection:
+        others = [row[0] for row in connection.execute("SELECT image_id FROM images")]
+        pairs = [(pycolmap.image_pair_to_pair_id(image_id, other),) for other in others]
+        for table in ("matches", "two_view_geometries"):
+            connection.executemany(f"DELETE FROM {table} WHERE pair_id = ?", pairs)
+        for table in ("keypoints", "descriptors", "images"):
+            connection.execute(f"DELETE FROM {table} WHERE image_id = ?", (image_id,))
+        for table in ("frame_data", "frames"):
+            connection.execute(f"DELETE FROM {table} WHERE frame_id = ?", (image_id,))
+        connection.execute("DELETE FROM pose_priors WHERE corr_data_id = ?", (image_id,))
+
+
+def _pose_prior(
+    image: pycolmap.Image, position: GeoPosition, altitude_m: float
+) -> pycolmap.PosePrior:
+    """COLMAP's WGS84 prior: latitude and longitude in degrees, altitude in metres.
+
+    A position without altitude has none: COLMAP turns all priors into NaN if the first has one.
+    """
     prior = pycolmap.PosePrior()
     prior.corr_data_id = image.data_id
     prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.WGS84
-    altitude_m = np.nan if position.altitude_m is None else position.altitude_m
     prior.position = np.array([position.latitude_deg, position.longitude_deg, altitude_m])
     return prior

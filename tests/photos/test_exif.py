@@ -169,3 +169,13 @@ def test_exif_of_what_is_no_image_is_empty(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(b"nothing of the kind")
     assert read_exif(tmp_path / "a.jpg").captured_at is None
     assert read_exif(tmp_path / "missing.jpg").captured_at is None
+
+
+@pytest.mark.parametrize("fraction", ["9" * 400, "9" * 12, "5"])
+def test_a_fraction_of_a_second_never_costs_the_photo(tmp_path: Path, fraction: str) -> None:
+    """At the calendar's end, rounding up to a whole second left it."""
+    exif = Image.Exif()
+    exif.get_ifd(0x8769).update({0x9003: "9999:12:31 23:59:59", 0x9291: fraction})
+    photo = read_photo(tmp_path, encoded("JPEG", exif.tobytes()))
+    assert photo.exif.captured_at is not None
+    assert photo.exif.captured_at.year == 9999

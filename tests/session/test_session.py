@@ -18,6 +18,7 @@ from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.model import MapperOptions
 from sfm_front.photos.cameras import CameraOptions
+from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
 from sfm_front.types import ModelSummary, Skipped, SkipReason, StepReport
@@ -266,3 +267,34 @@ def test_the_package_offers_the_session():
     from sfm_front import Session as Offered
 
     assert Offered is Session
+
+
+def test_what_is_open_is_closed_if_a_later_part_cannot_be_made(tmp_path, monkeypatch):
+    """The limit on BLAS threads is the process's: a session that never began must not keep it."""
+
+    def fail(_path):
+        raise OSError("no database here")
+
+    monkeypatch.setattr("sfm_front.session.session.PhotoDatabase", fail)
+    before = WorkerPool._num_open
+    with pytest.raises(OSError, match="no database here"):
+        Session(tmp_path / "out", options(2))
+    assert WorkerPool._num_open == before
+
+
+def test_a_finished_session_takes_no_more_photos(orbit, tmp_path):
+    with Session(tmp_path / "out", options(1)) as session:
+        session.add_extracted(described(orbit, 0))
+        session.finish()
+        with pytest.raises(RuntimeError, match="finished"):
+            session.add_extracted(described(orbit, 1))
+        with pytest.raises(RuntimeError, match="finished"):
+            session.finish()
+
+
+def test_threads_and_seed_reach_every_part():
+    made = SessionOptions(threads=3, seed=7)
+    assert made.atlas.mapper.num_threads == 3
+    assert made.atlas.mapper.seed == 7
+    assert made.atlas.localization.seed == 7
+    assert made.verification.seed == 7

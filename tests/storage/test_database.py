@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -119,15 +121,44 @@ def test_gps_is_a_wgs84_prior_of_its_photo_alone(database):
     np.testing.assert_array_equal(prior.position.ravel(), [47.5, -8.25, 512.0])
 
 
-def test_a_position_without_altitude_is_kept(orbit, tmp_path):
-    exif = Exif(position=GeoPosition(10.0, 20.0))
-    with PhotoDatabase(tmp_path / "database.db") as store:
-        store.write(1, replace(described(orbit, 0), exif=exif), orbit.camera, [])
-    with pycolmap.Database.open(tmp_path / "database.db") as database:
-        (prior,) = database.read_all_pose_priors()
-    assert prior.position.ravel()[:2].tolist() == [10.0, 20.0]
-    assert not np.isfinite(prior.position.ravel()[2])
+def test_a_position_without_altitude_spoils_no_other(orbit, tmp_path):
+    """COLMAP would turn all priors into NaN if the first had no altitude."""
+    positions = [GeoPosition(10.0, 20.0), GeoPosition(10.0, 20.0, 30.0)]
+    with PhotoDatabase(tmp_path / "database.db") as database:
+        for image_id, position in enumerate(positions, 1):
+            photo = replace(described(orbit, image_id - 1), exif=Exif(position=position))
+            database.write(image_id, photo, orbit.camera, [])
+    with pycolmap.Database.open(tmp_path / "database.db") as opened:
+        (prior,) = opened.read_all_pose_priors()
+    assert prior.position.ravel().tolist() == [10.0, 20.0, 30.0]
 
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_a_write_that_fails_leaves_nothing_of_the_photo(orbit, tmp_path, error):
+    file = tmp_path / "database.db"
+
+    def pairs():
+        yield true_pair(orbit, 1, 0, (2, 1))
+        raise error
+
+    with PhotoDatabase(file) as database:
+        database.write(1, described(orbit, 0), orbit.camera, [])
+        with pytest.raises(error):
+            database.write(2, described(orbit, 1), orbit.camera, pairs())
+        with closing(sqlite3.connect(file)) as rows:
+            left = {
+                table: rows.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
+                for table in (*EACH_PHOTO, "matches", "two_view_geometries")
+            }
+        assert left == {table: table in EACH_PHOTO for table in left}
+        # The same photo can be written again.
+        database.write(2, described(orbit, 1), orbit.camera, [true_pair(orbit, 1, 0, (2, 1))])
+    with pycolmap.Database.open(file) as opened:
+        assert opened.num_images() == 2
+        assert opened.num_verified_image_pairs() == 1
+
+
+EACH_PHOTO = ("images", "frames", "frame_data", "keypoints", "descriptors")
 
 KILLED_WHILE_WRITING = """
 import os, sys

@@ -34,7 +34,8 @@ class PerceptualHash:
         low = spectrum[:_LOW_FREQUENCIES, :_LOW_FREQUENCIES].ravel()
         # The mean brightness, which comes first, would only shift the median.
         bits = low > np.median(low[1:])
-        return np.where(bits, 1, -1).astype(np.float32) / np.float32(BITS**0.5)
+        unit: Float32Array = np.where(bits, 1, -1).astype(np.float32) / np.float32(BITS**0.5)
+        return unit
 
 
 def packed(vector: Float32Array) -> Uint8Array:

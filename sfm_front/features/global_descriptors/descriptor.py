@@ -83,12 +83,14 @@ class GlobalDescriptor:
     def describe_pixels(self, pixels: Uint8Array) -> Float32Array:
         """(h, w, 3) uint8 RGB → the networks' share; empty if no part needs pixels."""
         vectors = [part.describe(pixels) for part in self._networks]
-        return self._network_factor * _side_by_side(vectors)
+        share: Float32Array = self._network_factor * _side_by_side(vectors)
+        return share
 
     def describe_local(self, features: Features) -> Float32Array:
         """SIFT features → VLAD's share; empty if no part needs features."""
         vectors = [part.describe(features) for part in self._local]
-        return self._local_factor * _side_by_side(vectors)
+        share: Float32Array = self._local_factor * _side_by_side(vectors)
+        return share
 
     def join(self, of_pixels: Float32Array, of_features: Float32Array) -> Float32Array:
         """Both shares → (dimension,) float32 of length 1."""
