@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,14 @@ class Skipped:
 
     def __str__(self) -> str:
         return f"{self.reason.value}: {self.detail}" if self.detail else self.reason.value
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoPath:
+    """A photo's file, and its name: the path below the photo folder with forward slashes."""
+
+    name: str
+    path: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +132,24 @@ class ExtractedPhoto:
     seconds: dict[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One side of a pair: a photo's image id, its camera and its features."""
+
+    image_id: int
+    camera: pycolmap.Camera
+    features: Features
+
+    def points(self, indices: NDArray[Any]) -> Float64Array:
+        """(K, 2) pixels of the keypoints with these indices."""
+        return self.features.keypoints[indices, :2].astype(np.float64)
+
+    def rays(self, indices: NDArray[Any]) -> Float64Array:
+        """(K, 3) directions in the camera, z = 1; nan where undistortion fails."""
+        undistorted = self.camera.cam_from_img(self.points(indices))
+        return np.column_stack([np.asarray(undistorted, np.float64), np.ones(len(indices))])
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """A photo that may overlap the query.
@@ -148,6 +174,26 @@ class Rejection(Enum):
     NO_EPIPOLAR_GEOMETRY = "no epipolar geometry"
     TOO_FEW_INLIERS = "too few inliers"
     WATERMARK = "watermark"
+    UNLIKELY = "too few inliers among the largest features"
+
+
+@dataclass(frozen=True, slots=True)
+class RejectedPair:
+    """Two photos without a two-view geometry, and why.
+
+    ``num_matches``: tentative matches, None if they were not matched on all features;
+    ``num_inliers``: those that survived the step that rejected the pair.
+    """
+
+    image_id1: int
+    image_id2: int
+    reason: Rejection
+    num_matches: int | None
+    num_inliers: int
+
+    def __str__(self) -> str:
+        of = "" if self.num_matches is None else f" of {self.num_matches} matches"
+        return f"{self.reason.value} ({self.num_inliers}{of})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,7 +223,8 @@ class StepReport:
     """What became of one photo when it arrived.
 
     ``image_id`` is None and ``skipped`` is set when the photo was not used at all.
-    ``candidates`` are ordered as re-ranked; ``most_relevant`` is the first of them.
+    ``candidates`` are ordered as re-ranked; ``most_relevant`` is the first of them. ``verified``
+    names the photos with a verified pair; ``rejected`` are the pairs that were tried in vain.
     ``registered`` names every photo placed by this step: this one, and waiting ones.
     ``num_registered`` and ``num_points`` are those of all models after this step.
     ``seconds`` is by stage, and work done ahead counts too. ``events`` tells what was started,
@@ -191,6 +238,7 @@ class StepReport:
     most_relevant: str | None = None
     num_keypoints: int = 0
     verified: tuple[str, ...] = ()
+    rejected: tuple[RejectedPair, ...] = ()
     registered: tuple[str, ...] = ()
     num_registered: int = 0
     num_points: int = 0

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 
 from sfm_front import __version__
 from sfm_front.cli import reconstruct, retrieve, view
+from sfm_front.cli.logs import add_logging, logging_to
 from sfm_front.errors import SfmFrontError
 
 
@@ -27,7 +28,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     # Pillow warns of damaged EXIF, line by line between the progress lines.
     warnings.filterwarnings("ignore", module=r"PIL\.")
     try:
-        return run(arguments)
+        with logging_to(arguments.verbose, arguments.log_file):
+            return run(arguments)
     except SfmFrontError as error:
         print(f"sfm-front {arguments.command}: {error}", file=sys.stderr)
         return 2
@@ -44,4 +46,5 @@ def _add(
 ) -> None:
     parser = commands.add_parser(name, help=summary, description=command.__doc__)
     command.add_arguments(parser)  # type: ignore[attr-defined]
+    add_logging(parser)
     parser.set_defaults(run=command.run)  # type: ignore[attr-defined]

@@ -113,8 +113,11 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     """What was given on the command line; the rest is the session's default."""
     from sfm_front.photos.cameras import CameraOptions
     from sfm_front.session.options import SessionOptions
+    from sfm_front.session.pair_matching import PairMatchingOptions
 
-    given = shared.given(arguments, "num_matched")
+    given = shared.given(arguments)
+    if arguments.num_matched is not None:
+        given["pair_matching"] = PairMatchingOptions(num_matched=arguments.num_matched)
     cameras = {
         "mode": arguments.camera_mode,
         "model": arguments.camera_model,

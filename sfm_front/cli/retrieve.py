@@ -16,8 +16,8 @@ from sfm_front.cli import arguments as shared
 from sfm_front.cli.progress import CountLine
 from sfm_front.cli.reconstruct import default_output
 from sfm_front.errors import ConfigError, InputError
-from sfm_front.photos.source import PhotoPath, list_photos
-from sfm_front.types import ExtractedPhoto, Skipped
+from sfm_front.photos.source import list_photos
+from sfm_front.types import ExtractedPhoto, PhotoPath, Skipped
 
 if TYPE_CHECKING:
     from sfm_front.features.cached_extraction import CachedExtraction

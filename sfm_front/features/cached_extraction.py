@@ -19,9 +19,16 @@ from sfm_front.features.feature_cache import (
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader, file_digest
-from sfm_front.photos.source import PhotoPath
 from sfm_front.runtime.prefetch import prefetch
-from sfm_front.types import ExtractedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
+from sfm_front.types import (
+    ExtractedPhoto,
+    Features,
+    Float32Array,
+    Photo,
+    PhotoPath,
+    Skipped,
+    SkipReason,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,11 +10,18 @@ from weakref import WeakSet
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.photos.source import PhotoPath
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.prefetch import prefetch
 from sfm_front.runtime.stopwatch import Stopwatch
-from sfm_front.types import ExtractedPhoto, Features, Float32Array, Photo, Skipped, SkipReason
+from sfm_front.types import (
+    ExtractedPhoto,
+    Features,
+    Float32Array,
+    Photo,
+    PhotoPath,
+    Skipped,
+    SkipReason,
+)
 
 if TYPE_CHECKING:
     from sfm_front.features.colmap_sift import ColmapSift

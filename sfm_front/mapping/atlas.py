@@ -11,7 +11,7 @@ from sfm_front.mapping.localization import LocalizationOptions, locate, register
 from sfm_front.mapping.model import MapperOptions, Model
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.runtime.stopwatch import Stopwatch
-from sfm_front.types import Float32Array, PairGeometry
+from sfm_front.types import PairGeometry, View
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,9 +104,7 @@ class Atlas:
             self._start_near(image_id)
         return sorted(self.registered - before)
 
-    def locate(
-        self, camera_id: int, keypoints: Float32Array, pairs: Iterable[PairGeometry]
-    ) -> PosedCamera | None:
+    def locate(self, view: View, pairs: Iterable[PairGeometry]) -> PosedCamera | None:
         """Pose in the largest model of a photo that is not in the scene yet, by these pairs.
 
         None where they do not tell.
@@ -114,6 +112,7 @@ class Atlas:
         if not self.models:
             return None
         model = self.models[0].reconstruction
+        camera_id, keypoints = view.camera.camera_id, view.features.keypoints
         return locate(model, camera_id, keypoints, pairs, self._options.localization)
 
     def poses_of(self, image_ids: Iterable[int]) -> dict[int, PosedCamera]:

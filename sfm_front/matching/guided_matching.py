@@ -13,9 +13,9 @@ from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.matching.epipolar import EpipolarPlanes
 from sfm_front.matching.in_plane_rotation import agrees_with_rotation
 from sfm_front.matching.nearest_neighbors import MatchingOptions, match_masked
-from sfm_front.matching.verification import VerificationOptions, View
+from sfm_front.matching.verification import VerificationOptions
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate, Float64Array, PairGeometry, Uint32Array
+from sfm_front.types import Candidate, Float64Array, PairGeometry, Uint32Array, View
 
 _CALIBRATED = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
@@ -11,7 +10,14 @@ import pycolmap
 from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
-from sfm_front.types import Features, Float64Array, PairGeometry, Rejection, Uint32Array
+from sfm_front.types import (
+    Float64Array,
+    PairGeometry,
+    RejectedPair,
+    Rejection,
+    Uint32Array,
+    View,
+)
 
 _WATERMARK = int(pycolmap.TwoViewGeometryConfiguration.WATERMARK)
 _WITH_ESSENTIAL_MATRIX = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
@@ -46,24 +52,6 @@ class VerificationOptions:
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """One side of a pair: a photo's image id, its camera and its features."""
-
-    image_id: int
-    camera: pycolmap.Camera
-    features: Features
-
-    def points(self, indices: NDArray[Any]) -> Float64Array:
-        """(K, 2) pixels of the keypoints with these indices."""
-        return self.features.keypoints[indices, :2].astype(np.float64)
-
-    def rays(self, indices: NDArray[Any]) -> Float64Array:
-        """(K, 3) directions in the camera, z = 1; nan where undistortion fails."""
-        undistorted = self.camera.cam_from_img(self.points(indices))
-        return np.column_stack([np.asarray(undistorted, np.float64), np.ones(len(indices))])
-
-
 class Verifier:
     """Estimates two-view geometry. The same input gives the same output; threads may share it."""
 
@@ -86,7 +74,7 @@ class Verifier:
         """Number of inliers."""
         return len(self.inliers(view1, view2, matches))
 
-    def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | Rejection:
+    def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | RejectedPair:
         """Two-view geometry of two photos from their tentative matches (M, 2).
 
         A fundamental matrix (OpenCV's USAC) gates first: where nothing matches it takes
@@ -94,17 +82,21 @@ class Verifier:
         sees a sample of the survivors, and its essential matrix is tested on every match.
         """
         options = self.options
+
+        def rejected(reason: Rejection, num_inliers: int) -> RejectedPair:
+            return RejectedPair(view1.image_id, view2.image_id, reason, len(matches), num_inliers)
+
         if len(matches) < options.min_inliers:
-            return Rejection.TOO_FEW_MATCHES
+            return rejected(Rejection.TOO_FEW_MATCHES, 0)
         gate = self._gate(view1, view2, matches)
         survivors = np.flatnonzero(gate)
         if len(survivors) < options.min_inliers:
-            return Rejection.NO_EPIPOLAR_GEOMETRY
+            return rejected(Rejection.NO_EPIPOLAR_GEOMETRY, len(survivors))
         geometry = self._estimate(view1, view2, matches[self._sample(survivors)])
         if geometry.config == _WATERMARK:
-            return Rejection.WATERMARK
+            return rejected(Rejection.WATERMARK, len(geometry.inlier_matches))
         if len(geometry.inlier_matches) < options.min_inliers:
-            return Rejection.TOO_FEW_INLIERS
+            return rejected(Rejection.TOO_FEW_INLIERS, len(geometry.inlier_matches))
         if geometry.config == _WITH_ESSENTIAL_MATRIX and geometry.E is not None:
             consistent = self._essential_inliers(geometry.E, view1, view2, matches)
             if np.count_nonzero(consistent) > len(survivors):

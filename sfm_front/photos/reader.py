@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import stat
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,24 +63,6 @@ def file_digest(path: Path, name: str) -> str | Skipped:
     """The digest that a ``Photo`` of this file has, decodable or not. No file makes this raise."""
     data = _content(path, name)
     return data if isinstance(data, Skipped) else _digest(data)
-
-
-class DuplicateFinder:
-    """Tells photos that are byte for byte the same as an earlier one.
-
-    ``known`` maps the digests of a session that is resumed to the photos' names. Ask in the order
-    in which photos arrive, from one thread: the first of several copies is the one that is kept.
-    """
-
-    def __init__(self, known: Mapping[str, str] | None = None) -> None:
-        self._name_by_digest = dict(known or {})
-
-    def check(self, name: str, digest: str) -> Skipped | None:
-        """Skipped if an earlier photo of another name has this digest; None remembers this one."""
-        first = self._name_by_digest.setdefault(digest, name)
-        if first == name:
-            return None
-        return Skipped(name, SkipReason.DUPLICATE, f"same file as {first}")
 
 
 def _content(path: Path, name: str) -> bytes | Skipped:

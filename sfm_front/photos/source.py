@@ -6,7 +6,6 @@ import logging
 import os
 import random
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Literal, get_args
@@ -14,18 +13,11 @@ from typing import Literal, get_args
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.photos.exif import read_exif
 from sfm_front.photos.formats import EXTENSIONS
+from sfm_front.types import PhotoPath
 
 logger = logging.getLogger(__name__)
 
 PhotoOrder = Literal["name", "time", "random"]
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoPath:
-    """A photo's file, and its name: the path below the photo folder with forward slashes."""
-
-    name: str
-    path: Path
 
 
 def list_photos(folder: Path, *, exclude: Path | None = None) -> list[PhotoPath]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.storage.json_files import write_json
-from sfm_front.types import PREFETCHED_STAGES, ModelSummary, StepReport
+from sfm_front.types import PREFETCHED_STAGES, ModelSummary, RejectedPair, StepReport
 
 
 class Report(Closeable):
@@ -34,6 +34,7 @@ class Report(Closeable):
             return
         self._names[step.image_id] = step.name
         verified = set(step.verified)
+        rejected = {pair.image_id2: pair for pair in step.rejected}
         line = {
             "name": step.name,
             "most_relevant": step.most_relevant,
@@ -43,6 +44,7 @@ class Report(Closeable):
                     "cosine": round(candidate.cosine, 5),
                     "inliers": candidate.inliers,
                     "verified": self._names[candidate.image_id] in verified,
+                    "rejected": _rejection(rejected.get(candidate.image_id)),
                 }
                 for candidate in step.candidates
             ],
@@ -106,6 +108,7 @@ class Report(Closeable):
         row["keypoints"] = step.num_keypoints
         row["most_relevant"] = step.most_relevant
         row["verified_pairs"] = len(step.verified)
+        row["rejected_pairs"] = len(step.rejected)
         row["placed_by_this_step"] = list(step.registered)
         row["seconds"] = _rounded(step.seconds)
         row["events"] = list(step.events)
@@ -154,6 +157,17 @@ class Report(Closeable):
             for start, end in pairwise(bounds)
             if end > start
         ]
+
+
+def _rejection(pair: RejectedPair | None) -> dict[str, Any] | None:
+    """Why a candidate has no verified pair; None if it has one, or was not matched."""
+    if pair is None:
+        return None
+    return {
+        "reason": pair.reason.value,
+        "matches": pair.num_matches,
+        "inliers": pair.num_inliers,
+    }
 
 
 def _rounded(seconds: Mapping[str, float]) -> dict[str, float]:

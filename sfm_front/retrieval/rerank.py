@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from sfm_front.errors import ConfigError
 from sfm_front.matching.in_plane_rotation import in_plane_rotation
 from sfm_front.matching.matcher import Matcher
-from sfm_front.matching.verification import Verifier, View
+from sfm_front.matching.verification import Verifier
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate, Uint32Array
+from sfm_front.types import Candidate, Uint32Array, View
 
 _AT_ONCE = 12
 _GOOD_INLIERS = 30

@@ -11,13 +11,12 @@ from sfm_front.errors import ConfigError
 from sfm_front.matching.matcher import make_matcher
 from sfm_front.matching.nearest_neighbors import NO_MATCHES, MatchingOptions, match_descriptors
 from sfm_front.matching.verification import VerificationOptions, Verifier
-from sfm_front.photos.source import PhotoPath
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.search.photo_index import PhotoIndex, view_of
-from sfm_front.types import Candidate, ExtractedPhoto, Float64Array, PairGeometry
+from sfm_front.types import Candidate, ExtractedPhoto, Float64Array, PairGeometry, PhotoPath
 
 SearchMethod = Literal["ours", "exhaustive", "cosine"]
 

@@ -12,11 +12,9 @@ from sfm_front.cli.progress import CountLine
 from sfm_front.errors import InputError
 from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto
 from sfm_front.features.feature_cache import CacheKeys
-from sfm_front.matching.verification import View
 from sfm_front.photos.cameras import CameraCatalog, CameraOptions
-from sfm_front.photos.source import PhotoPath
 from sfm_front.storage.json_files import write_json
-from sfm_front.types import ExtractedPhoto, Float32Array, Skipped, SkipReason
+from sfm_front.types import ExtractedPhoto, Float32Array, PhotoPath, Skipped, SkipReason, View
 
 _FORMAT = 1
 _FILE = "index.json"

@@ -16,6 +16,7 @@ from sfm_front.photos.cameras import CameraOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
+from sfm_front.session.pair_matching import PairMatchingOptions
 
 
 def available_cores() -> int:
@@ -32,8 +33,7 @@ class SessionOptions:
     knows; ``weights``: a file for its network; ``device``: ``auto``, ``cpu`` or
     ``cuda``, of the network and of matching. ``rerank``: the look that ranks candidates;
     ``second_rerank``: at those of which it told too little.
-    ``num_matched``: re-ranked photos that are matched on all features. ``num_matched_first``:
-    number of top candidates matched without guidance; the pose they yield guides the rest.
+    ``pair_matching``: the candidates that are matched on all features.
     ``threads``: cores to use. ``seed``: of all RANSAC. Both reach every part from here.
     ``text``: write models in COLMAP's text form too.
     """
@@ -43,8 +43,6 @@ class SessionOptions:
     global_descriptor: str = "auto"
     weights: Path | None = None
     device: str = "auto"
-    num_matched: int = 8
-    num_matched_first: int = 3
     text: bool = False
     threads: int = field(default_factory=available_cores)
     seed: int = 0
@@ -52,16 +50,13 @@ class SessionOptions:
     retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
     rerank: RerankOptions = field(default_factory=RerankOptions)
     second_rerank: RerankOptions = field(default_factory=lambda: RerankOptions(max_features=2000))
+    pair_matching: PairMatchingOptions = field(default_factory=PairMatchingOptions)
     matching: MatchingOptions = field(default_factory=MatchingOptions)
     guided: GuidedOptions = field(default_factory=GuidedOptions)
     verification: VerificationOptions = field(default_factory=VerificationOptions)
     atlas: AtlasOptions = field(default_factory=AtlasOptions)
 
     def __post_init__(self) -> None:
-        if self.num_matched < 1:
-            raise ConfigError(f"num_matched must be at least 1, got {self.num_matched}")
-        if self.num_matched_first < 1:
-            raise ConfigError(f"num_matched_first must be at least 1, got {self.num_matched_first}")
         if self.threads < 1:
             raise ConfigError(f"threads must be at least 1, got {self.threads}")
         mapper = replace(self.atlas.mapper, num_threads=self.threads, seed=self.seed)

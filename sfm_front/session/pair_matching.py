@@ -1,44 +1,163 @@
-"""Tentative matches of a photo with its best candidates: on all features, where that pays."""
+"""Which candidates a photo is matched with on all features, and how."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
+from sfm_front.errors import ConfigError
+from sfm_front.geometry.posed_camera import PosedCamera
+from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import Matcher
-from sfm_front.matching.verification import View
+from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker
-from sfm_front.types import Candidate, Uint32Array
+from sfm_front.runtime.stopwatch import Stopwatch
+from sfm_front.runtime.worker_pool import WorkerPool
+from sfm_front.types import Candidate, PairGeometry, RejectedPair, Rejection, Uint32Array, View
 
-_MIN_INLIERS = 11
+logger = logging.getLogger(__name__)
+
+Locate = Callable[[View, Sequence[PairGeometry]], "PosedCamera | None"]
+"""A photo's camera and pose in the model, by its first verified pairs; None if they do not tell."""
+
+PosesOf = Callable[[Iterable[int]], Mapping[int, PosedCamera]]
+"""Cameras and poses of those of these photos that are in the model."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairMatchingOptions:
+    """Which candidates are matched on all features."""
+
+    # Re-ranked photos that are matched.
+    num_matched: int = 8
+    # Number of top candidates matched without guidance; the pose they yield guides the rest.
+    num_matched_first: int = 3
+    # Inliers of the second re-ranking below which matching all features never pays.
+    min_inliers: int = 11
+
+    def __post_init__(self) -> None:
+        for name in ("num_matched", "num_matched_first", "min_inliers"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
 
 
 class CandidateMatcher:
-    """Matches on all features only the candidates likely to be verified.
+    """Matches the best candidates on all features, and verifies.
 
-    Where the re-ranking's few hundred features showed how far a candidate is turned, all features
-    are matched accordingly. Where they did not, a second look at some more features comes first,
-    and below 11 inliers it is the last: of 345 such pairs of 13 scenes, 2 of the 162 with fewer
-    would have been verified on all features, 31 of 73 with 11 to 15, and 109 of 110 with more.
+    The first few are matched without guidance. If their verified pairs tell the photo's pose in
+    the model, the rest are matched along epipolar planes; those without a known pose are not.
     """
 
-    def __init__(self, matcher: Matcher, second_rerank: Reranker) -> None:
+    def __init__(
+        self,
+        options: PairMatchingOptions,
+        matcher: Matcher,
+        second_reranker: Reranker,
+        verifier: Verifier,
+        guided: GuidedMatcher,
+        workers: WorkerPool,
+    ) -> None:
+        self._options = options
         self._matcher = matcher
-        self._second_rerank = second_rerank
+        self._second_reranker = second_reranker
+        self._verifier = verifier
+        self._guided = guided
+        self._workers = workers
 
     def match(
+        self,
+        query: View,
+        candidates: Sequence[Candidate],
+        views: Mapping[int, View],
+        *,
+        locate: Locate,
+        poses_of: PosesOf,
+        clock: Stopwatch,
+    ) -> tuple[list[PairGeometry], list[RejectedPair]]:
+        """Candidates as re-ranked → verified pairs, and what became of the others matched."""
+        options = self._options
+        first = candidates[: options.num_matched_first]
+        rest = candidates[options.num_matched_first : options.num_matched]
+        pairs, rejected = self._match_unguided(query, first, views, clock)
+        if rest:
+            with clock.stage("locate"):
+                posed = locate(query, pairs)
+            if posed is not None:
+                with clock.stage("guide"):
+                    others = poses_of(candidate.image_id for candidate in rest)
+                    guided = self._guided.match(query, posed, rest, views, others)
+                pairs += guided
+                found = {pair.image_id2 for pair in guided}
+                rest = [candidate for candidate in rest if candidate.image_id not in found]
+            more, more_rejected = self._match_unguided(query, rest, views, clock)
+            pairs += more
+            rejected += more_rejected
+        _log(pairs, rejected)
+        return pairs, rejected
+
+    def _match_unguided(
+        self,
+        query: View,
+        candidates: Sequence[Candidate],
+        views: Mapping[int, View],
+        clock: Stopwatch,
+    ) -> tuple[list[PairGeometry], list[RejectedPair]]:
+        with clock.stage("match"):
+            tentative, dismissed = self.tentative_matches(query, candidates, views)
+
+        def verify(pair: tuple[View, Uint32Array]) -> PairGeometry | RejectedPair:
+            return self._verifier.verify(query, *pair)
+
+        with clock.stage("verify"):
+            verdicts = self._workers.map(verify, tentative)
+        pairs = [verdict for verdict in verdicts if isinstance(verdict, PairGeometry)]
+        rejected = [verdict for verdict in verdicts if isinstance(verdict, RejectedPair)]
+        return pairs, dismissed + rejected
+
+    def tentative_matches(
         self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]
-    ) -> list[tuple[View, Uint32Array]]:
-        """Candidates as re-ranked → those worth it, in their order, with their matches (K, 2)."""
+    ) -> tuple[list[tuple[View, Uint32Array]], list[RejectedPair]]:
+        """Those likely to be verified, in their order, with their matches (K, 2); and the others.
+
+        If re-ranking told a candidate's in-plane rotation, only features that agree with it are
+        matched. If not, a second re-ranking on more features decides whether to match at all.
+        """
         doubtful = [candidate for candidate in candidates if candidate.rotation_rad is None]
-        closer = {c.image_id: c for c in self._second_rerank.rerank(query, doubtful, views)}
-        looked = [closer.get(candidate.image_id, candidate) for candidate in candidates]
-        worth = [
-            c for c in looked if c.rotation_rad is not None or (c.inliers or 0) >= _MIN_INLIERS
+        again = {c.image_id: c for c in self._second_reranker.rerank(query, doubtful, views)}
+        known = [again.get(candidate.image_id, candidate) for candidate in candidates]
+        likely = [
+            candidate
+            for candidate in known
+            if candidate.rotation_rad is not None
+            or (candidate.inliers or 0) >= self._options.min_inliers
         ]
-        others = [views[candidate.image_id] for candidate in worth]
+        chosen = {candidate.image_id for candidate in likely}
+        dismissed = [
+            RejectedPair(
+                query.image_id,
+                candidate.image_id,
+                Rejection.UNLIKELY,
+                num_matches=None,
+                num_inliers=candidate.inliers or 0,
+            )
+            for candidate in known
+            if candidate.image_id not in chosen
+        ]
+        others = [views[candidate.image_id] for candidate in likely]
         matches = self._matcher.match(
             query.features,
             [other.features for other in others],
-            [candidate.rotation_rad for candidate in worth],
+            [candidate.rotation_rad for candidate in likely],
         )
-        return list(zip(others, matches, strict=True))
+        return list(zip(others, matches, strict=True)), dismissed
+
+
+def _log(pairs: Sequence[PairGeometry], rejected: Sequence[RejectedPair]) -> None:
+    for pair in pairs:
+        logger.debug(
+            "images %d and %d: verified, %d of %d matches are inliers",
+            *(pair.image_id1, pair.image_id2, pair.num_inliers, len(pair.matches)),
+        )
+    for refused in rejected:
+        logger.debug("images %d and %d: %s", refused.image_id1, refused.image_id2, refused)

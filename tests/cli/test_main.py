@@ -67,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
         ("--camera-model", SessionOptions().cameras.model),
         ("--global-descriptor", SessionOptions().global_descriptor),
         ("--candidates", SessionOptions().retrieval.candidates),
-        ("--matched", SessionOptions().num_matched),
+        ("--matched", SessionOptions().pair_matching.num_matched),
     ],
 )
 def test_help_tells_the_defaults_of_a_session(argument, default):

@@ -18,8 +18,7 @@ from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.photos.source import PhotoPath
-from sfm_front.types import Exif, GeoPosition, Skipped, SkipReason
+from sfm_front.types import Exif, GeoPosition, PhotoPath, Skipped, SkipReason
 
 SUBPIXEL_PX = 0.6
 VECTOR_TOLERANCE = 1e-6  # float32

@@ -16,8 +16,7 @@ from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.photos.source import PhotoPath
-from sfm_front.types import ExtractedPhoto, Skipped, SkipReason
+from sfm_front.types import ExtractedPhoto, PhotoPath, Skipped, SkipReason
 
 VECTOR_TOLERANCE = 1e-6  # float32
 

@@ -11,8 +11,7 @@ import pycolmap
 
 from helpers import photo_files
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Dataset, Query, Ranked
-from sfm_front.matching.verification import View
-from sfm_front.types import Features
+from sfm_front.types import Features, View
 
 NUM_FEATURES = 300
 

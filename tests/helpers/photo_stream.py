@@ -11,8 +11,7 @@ import pycolmap
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, as_described
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.matching.verification import View
-from sfm_front.types import ExtractedPhoto, Features, Float64Array, PairGeometry
+from sfm_front.types import ExtractedPhoto, Features, Float64Array, PairGeometry, View
 
 MIN_SHARED_POINTS = 30
 

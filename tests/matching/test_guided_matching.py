@@ -14,9 +14,9 @@ from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.matching.guided_matching import GuidedMatcher, GuidedOptions, two_view_geometry
 from sfm_front.matching.nearest_neighbors import MatchingOptions
-from sfm_front.matching.verification import VerificationOptions, View
+from sfm_front.matching.verification import VerificationOptions
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate, PairGeometry
+from sfm_front.types import Candidate, PairGeometry, View
 
 QUERY, NEAR, NEXT = 0, 1, 2
 MIN_RECALL = 0.9

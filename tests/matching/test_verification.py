@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
-from sfm_front.matching.verification import VerificationOptions, Verifier, View
-from sfm_front.types import Features, PairGeometry, Rejection
+from sfm_front.matching.verification import VerificationOptions, Verifier
+from sfm_front.types import Features, PairGeometry, RejectedPair, Rejection, View
 
 WIDTH, HEIGHT = 1600, 1200
 NOISE_PX = 0.5
@@ -162,14 +162,14 @@ def test_a_camera_that_only_turned_is_verified():
 def test_random_matches_are_rejected(seed):
     pair = make_pair(0, 100, seed=seed)
     result = Verifier().verify(pair.view1, pair.view2, pair.matches)
-    assert result is Rejection.NO_EPIPOLAR_GEOMETRY
+    assert result.reason is Rejection.NO_EPIPOLAR_GEOMETRY
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 14])
 def test_fewer_matches_than_inliers_needed_are_rejected_at_once(count):
     pair = make_pair(count, 0)
     result = Verifier().verify(pair.view1, pair.view2, pair.matches)
-    assert result is Rejection.TOO_FEW_MATCHES
+    assert result.reason is Rejection.TOO_FEW_MATCHES
 
 
 def test_a_watermark_is_no_overlap():
@@ -177,7 +177,7 @@ def test_a_watermark_is_no_overlap():
     stamp = np.array([20.0, 1120.0]) + rng.random((60, 2)) * (150, 60)
     view1, view2 = view_at(2, stamp), view_at(1, stamp + rng.normal(0, 0.2, stamp.shape))
     matches = np.arange(60, dtype=np.uint32)[:, None].repeat(2, axis=1)
-    assert Verifier().verify(view1, view2, matches) is Rejection.WATERMARK
+    assert Verifier().verify(view1, view2, matches).reason is Rejection.WATERMARK
 
 
 def test_min_inliers_is_obeyed():
@@ -188,7 +188,7 @@ def test_min_inliers_is_obeyed():
     )
     assert isinstance(
         Verifier(VerificationOptions(min_inliers=50)).verify(pair.view1, pair.view2, pair.matches),
-        Rejection,
+        RejectedPair,
     )
 
 
@@ -228,7 +228,7 @@ def test_count_inliers_counts_the_true_matches():
 
 
 def outcome(result: PairGeometry | Rejection) -> object:
-    if isinstance(result, Rejection):
+    if isinstance(result, RejectedPair):
         return result
     geometry = result.two_view_geometry
     return (

@@ -11,7 +11,8 @@ from helpers.image_making import encoded, read, read_photo, scene
 from PIL import Image
 
 from sfm_front.errors import ConfigError
-from sfm_front.photos.reader import DuplicateFinder, PhotoReader, file_digest
+from sfm_front.photos.duplicates import DuplicateFinder
+from sfm_front.photos.reader import PhotoReader, file_digest
 from sfm_front.types import Photo, Skipped, SkipReason
 
 

@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 from sfm_front.errors import ConfigError, InputError
-from sfm_front.photos.source import PhotoPath, list_photos, order_photos
+from sfm_front.photos.source import list_photos, order_photos
+from sfm_front.types import PhotoPath
 
 
 def touch(folder: Path, *names: str) -> None:

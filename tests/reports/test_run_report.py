@@ -9,7 +9,15 @@ import pytest
 from helpers.model_building import looking, make_model
 
 from sfm_front.reports.run_report import Report
-from sfm_front.types import Candidate, ModelSummary, Skipped, SkipReason, StepReport
+from sfm_front.types import (
+    Candidate,
+    ModelSummary,
+    RejectedPair,
+    Rejection,
+    Skipped,
+    SkipReason,
+    StepReport,
+)
 
 POSE = looking([0, 0, 0], [0, 1, 0], [0, 0, 1])
 
@@ -46,6 +54,7 @@ STEPS = [
         image_id=3,
         candidates=(Candidate(2, 0.9, 12), Candidate(1, 0.95, 3)),
         most_relevant="b.jpg",
+        rejected=(RejectedPair(3, 1, Rejection.NO_EPIPOLAR_GEOMETRY, 31, 9),),
         num_registered=2,
         num_points=50,
     ),
@@ -78,14 +87,34 @@ def test_a_line_of_retrieval_for_each_photo_that_is_used(tmp_path):
         {
             "name": "b.jpg",
             "most_relevant": "ä 1.jpg",
-            "candidates": [{"name": "ä 1.jpg", "cosine": 0.12346, "inliers": 40, "verified": True}],
+            "candidates": [
+                {
+                    "name": "ä 1.jpg",
+                    "cosine": 0.12346,
+                    "inliers": 40,
+                    "verified": True,
+                    "rejected": None,
+                }
+            ],
         },
         {
             "name": "c.jpg",
             "most_relevant": "b.jpg",
             "candidates": [
-                {"name": "b.jpg", "cosine": 0.9, "inliers": 12, "verified": False},
-                {"name": "ä 1.jpg", "cosine": 0.95, "inliers": 3, "verified": False},
+                {
+                    "name": "b.jpg",
+                    "cosine": 0.9,
+                    "inliers": 12,
+                    "verified": False,
+                    "rejected": None,
+                },
+                {
+                    "name": "ä 1.jpg",
+                    "cosine": 0.95,
+                    "inliers": 3,
+                    "verified": False,
+                    "rejected": {"reason": "no epipolar geometry", "matches": 31, "inliers": 9},
+                },
             ],
         },
     ]

@@ -12,10 +12,10 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.matching.matcher import CpuMatcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions
-from sfm_front.matching.verification import Verifier, View
+from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate
+from sfm_front.types import Candidate, View
 
 QUERY = 0
 OTHERS = (1, 2, 3, 6)

@@ -11,11 +11,11 @@ from sfm_front.evaluation.synthetic.scene import make_scene
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.matching.matcher import CpuMatcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions
-from sfm_front.matching.verification import Verifier, View
+from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate
+from sfm_front.types import Candidate, View
 
 COSINE_TOLERANCE = 0.01
 

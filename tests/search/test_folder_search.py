@@ -16,12 +16,12 @@ from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.photos.source import PhotoPath, list_photos
+from sfm_front.photos.source import list_photos
 from sfm_front.retrieval.retriever import RetrievalOptions
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.search.folder_search import Answer, FolderSearch, SearchOptions
 from sfm_front.search.photo_index import PhotoIndex
-from sfm_front.types import ExtractedPhoto
+from sfm_front.types import ExtractedPhoto, PhotoPath
 
 MATCH_ERROR_PX = 3.0
 RIGHT_MATCHES = 0.95

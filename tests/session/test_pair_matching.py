@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 from helpers.photo_stream import true_matches, view_of
 
+from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.geometry.posed_camera import PosedCamera
+from sfm_front.matching.guided_matching import GuidedMatcher, GuidedOptions
 from sfm_front.matching.matcher import CpuMatcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions
-from sfm_front.matching.verification import Verifier, View
+from sfm_front.matching.verification import VerificationOptions, Verifier
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
+from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.session.pair_matching import CandidateMatcher
-from sfm_front.types import Candidate, Features, Uint32Array
+from sfm_front.session.pair_matching import CandidateMatcher, PairMatchingOptions
+from sfm_front.types import Candidate, Features, Rejection, Uint32Array, View
 
 
 class Recorder:
@@ -62,15 +67,19 @@ def pairing_of(recorder, workers):
     """With a second look at so many features."""
 
     def make(second_rerank: int) -> CandidateMatcher:
-        options = RerankOptions(max_features=second_rerank)
-        return CandidateMatcher(recorder, Reranker(options, recorder, Verifier(), workers))
+        verifier = Verifier()
+        reranker = Reranker(RerankOptions(max_features=second_rerank), recorder, verifier, workers)
+        guided = GuidedMatcher(GuidedOptions(), MatchingOptions(), VerificationOptions(), workers)
+        options = PairMatchingOptions()
+        return CandidateMatcher(options, recorder, reranker, verifier, guided, workers)
 
     return make
 
 
 def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder, pairing_of):
     candidates = [Candidate(1, 0.5, 100, rotation_rad=0.0), Candidate(2, 0.4, 50, rotation_rad=0.0)]
-    found = pairing_of(200).match(views[0], candidates, views)
+    found, rejected = pairing_of(200).tentative_matches(views[0], candidates, views)
+    assert rejected == []
     whole = len(views[0].features)
     assert [asked for asked in recorder.asked if asked[1]] == [(whole, 2, True)]
     assert [view.image_id for view, _ in found] == [1, 2]
@@ -80,14 +89,19 @@ def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder, p
 
 
 def test_a_stranger_gets_a_second_look_and_no_more(views, recorder, pairing_of):
-    found = pairing_of(200).match(views[0], [Candidate(6, 0.5, 5)], views)
+    found, rejected = pairing_of(200).tentative_matches(views[0], [Candidate(6, 0.5, 5)], views)
     assert found == []
+    (pair,) = rejected
+    assert (pair.image_id1, pair.image_id2, pair.reason) == (0, 6, Rejection.UNLIKELY)
+    assert pair.num_matches is None
+    assert pair.num_inliers < PairMatchingOptions().min_inliers
     assert [asked for asked in recorder.asked if asked[1]] == [(200, 1, False)]
 
 
 def test_the_second_look_finds_what_the_first_missed(views, recorder, pairing_of):
     missed = [Candidate(6, 0.6, 3), Candidate(1, 0.5, 3)]
-    (found,) = pairing_of(400).match(views[0], missed, views)
+    (found,), rejected = pairing_of(400).tentative_matches(views[0], missed, views)
+    assert [pair.image_id2 for pair in rejected] == [6]
     other, matches = found
     assert other.image_id == 1
     assert len(matches) > 100
@@ -96,4 +110,61 @@ def test_the_second_look_finds_what_the_first_missed(views, recorder, pairing_of
 
 
 def test_nothing_to_match_is_nothing(views, pairing_of):
-    assert pairing_of(200).match(views[0], [], views) == []
+    assert pairing_of(200).tentative_matches(views[0], [], views) == ([], [])
+
+
+def test_the_pose_that_the_first_pairs_tell_guides_the_rest(orbit, views, pairing_of):
+    """Without one, all are matched unguided; either way each candidate gets one verdict."""
+    candidates = [
+        Candidate(image_id, 0.5, 100, rotation_rad=0.0, matches=true_matches(orbit, 0, image_id))
+        for image_id in (1, 2)
+    ]
+    one_first = replace_options(pairing_of(200), num_matched_first=1)
+    asked = []
+
+    def locate(view, pairs):
+        asked.append((view.image_id, [pair.image_id2 for pair in pairs]))
+        return orbit_pose(orbit, 0)
+
+    def poses_of(image_ids):
+        return {image_id: orbit_pose(orbit, image_id) for image_id in image_ids}
+
+    clock = Stopwatch()
+    pairs, rejected = one_first.match(
+        views[0], candidates, views, locate=locate, poses_of=poses_of, clock=clock
+    )
+    assert asked == [(0, [1])]
+    assert [pair.image_id2 for pair in pairs] == [1, 2]
+    assert rejected == []
+    assert clock.seconds.keys() >= {"match", "verify", "locate", "guide"}
+
+
+def test_a_rejected_pair_tells_why_and_how_many(views, pairing_of):
+    stranger = Candidate(6, 0.5, 100, rotation_rad=1.0)
+    pairs, (rejected,) = pairing_of(200).match(
+        views[0],
+        [stranger],
+        views,
+        locate=lambda _view, _pairs: None,
+        poses_of=lambda _ids: {},
+        clock=Stopwatch(),
+    )
+    assert pairs == []
+    assert rejected.reason in (Rejection.TOO_FEW_MATCHES, Rejection.NO_EPIPOLAR_GEOMETRY)
+    assert rejected.num_matches is not None
+    assert rejected.num_inliers < 15
+
+
+@pytest.mark.parametrize("name", ["num_matched", "num_matched_first", "min_inliers"])
+def test_numbers_below_one_are_refused(name):
+    with pytest.raises(ConfigError, match=f"{name} must be at least 1, got 0"):
+        PairMatchingOptions(**{name: 0})
+
+
+def replace_options(matcher: CandidateMatcher, **options: int) -> CandidateMatcher:
+    matcher._options = replace(matcher._options, **options)
+    return matcher
+
+
+def orbit_pose(orbit: SyntheticScene, index: int) -> PosedCamera:
+    return PosedCamera(orbit.camera, orbit.cams_from_world[index])

@@ -111,7 +111,7 @@ def test_a_step_says_what_was_retrieved_and_placed(orbit, session):
     # The neighbours on both sides of the circle.
     assert last.most_relevant in sorted(shared, key=shared.get, reverse=True)[:2]
     assert last.verified[0] == last.most_relevant
-    assert len(last.verified) <= SessionOptions().num_matched
+    assert len(last.verified) <= SessionOptions().pair_matching.num_matched
     names = [name for step in steps for name in step.registered]
     assert sorted(names) == [orbit.name(index) for index in range(NUM_PHOTOS)]
     assert last.num_registered == NUM_PHOTOS
@@ -128,7 +128,11 @@ def test_a_photo_that_can_be_located_is_matched_guided(session):
             for image_id in range(1, NUM_PHOTOS)
             if database.exists_two_view_geometry(NUM_PHOTOS, image_id)
         ]
-    assert len(geometries) == len(steps[-1].verified) > SessionOptions().num_matched_first
+    assert (
+        len(geometries)
+        == len(steps[-1].verified)
+        > SessionOptions().pair_matching.num_matched_first
+    )
     # Each says where the photos stand to each other, in the same way whoever found it.
     for geometry in geometries:
         assert np.linalg.norm(geometry.cam2_from_cam1.translation) == pytest.approx(1)
@@ -249,8 +253,6 @@ def test_a_session_does_not_write_over_another(session):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"num_matched": 0}, "num_matched must be at least 1, got 0"),
-        ({"num_matched_first": 0}, "num_matched_first must be at least 1, got 0"),
         ({"threads": 0}, "threads must be at least 1, got 0"),
         ({"global_descriptor": "bag"}, "no global descriptor is called 'bag'"),
         ({"max_features": 0}, "max_features must be at least 1"),

@@ -14,11 +14,9 @@ from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto
 from sfm_front.features.feature_cache import Box
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor
-from sfm_front.matching.verification import View
 from sfm_front.photos.cameras import CameraCatalog
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.photos.source import PhotoPath
-from sfm_front.types import Skipped
+from sfm_front.types import PhotoPath, Skipped, View
 
 Progress = Callable[[int, int], None]
 """Called with the photos done and all of them."""

@@ -21,8 +21,7 @@ import pycolmap
 
 from sfm_front.evaluation.retrieval.distractor_vectors import VectorMaker
 from sfm_front.evaluation.retrieval.types import BenchPhoto
-from sfm_front.matching.verification import View
-from sfm_front.types import Features, Float32Array
+from sfm_front.types import Features, Float32Array, View
 
 # Numbers in a row of the four times four cells of a SIFT descriptor, of eight directions each.
 _ROW_OF_CELLS = 32

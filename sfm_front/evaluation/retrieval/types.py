@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from sfm_front.matching.verification import View
-from sfm_front.types import Float32Array, Uint8Array
+from sfm_front.types import Float32Array, Uint8Array, View
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
 from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors
-from sfm_front.matching.verification import Verifier, View
+from sfm_front.matching.verification import Verifier
 from sfm_front.runtime.worker_pool import WorkerPool
+from sfm_front.types import View
 
 
 class Exhaustive:
