@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Sequence
 
 from sfm_front import __version__
-from sfm_front.cli import reconstruct, retrieve, view
+from sfm_front.cli import explain, reconstruct, retrieve, view
 from sfm_front.cli.logs import add_logging, logging_to
 from sfm_front.errors import SfmFrontError
 
@@ -23,6 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     _add(commands, "reconstruct", "folder of photos → sparse models", reconstruct)
     _add(commands, "retrieve", "folder and photo → its most relevant photos", retrieve)
     _add(commands, "view", "look at a sparse model", view)
+    _add(commands, "explain", "why a photo was placed, or was not", explain)
     arguments = parser.parse_args(argv)
     run: Callable[[argparse.Namespace], int] = arguments.run
     # Pillow warns of damaged EXIF, line by line between the progress lines.

@@ -1,0 +1,64 @@
+"""Tell why a photo was placed where it is, or was not: its candidates, matches and verdicts."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from sfm_front.errors import InputError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``explain``."""
+    parser.add_argument("output", type=Path, help="output of a finished reconstruction")
+    parser.add_argument("photo", help="the photo's name, as in report.json")
+    parser.add_argument(
+        "--draw",
+        type=Path,
+        metavar="FILE.png",
+        help="picture of the verified matches with its most relevant photo; needs --photos",
+    )
+    parser.add_argument(
+        "--photos", type=Path, metavar="FOLDER", help="the folder that was reconstructed"
+    )
+    parser.add_argument(
+        "--against", metavar="PHOTO", help="draw the matches with this photo instead"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Explain; 0 if the photo is in a model, 1 if it is in none."""
+    from sfm_front.reports.explanation import explain
+    from sfm_front.viewers.pictures import check_picture
+
+    if arguments.draw is not None:
+        if arguments.photos is None:
+            raise InputError("--draw needs --photos FOLDER: the output holds no pictures")
+        check_picture(arguments.draw)
+    explanation = explain(arguments.output, arguments.photo)
+    print(explanation)
+    if arguments.draw is not None:
+        first = next((candidate.name for candidate in explanation.candidates), None)
+        against = arguments.against or first or next(iter(explanation.later), None)
+        if against is None:
+            raise InputError(f"{arguments.photo}: nothing to draw, it has no candidates")
+        explain(arguments.output, against)  # That there is such a photo.
+        _draw(arguments.output, arguments.photos, arguments.photo, against, arguments.draw)
+    return 0 if explanation.model is not None else 1
+
+
+def _draw(output: Path, photos: Path, name1: str, name2: str, file: Path) -> None:
+    from sfm_front.reports.explanation import verified_matches
+    from sfm_front.viewers.match_drawing import draw_matches
+    from sfm_front.viewers.pictures import save
+
+    for name in (name1, name2):
+        if not (photos / name).is_file():
+            raise InputError(f"{photos / name}: no such photo. Give the folder with --photos.")
+    matches = verified_matches(output, name1, name2)
+    caption = f"{name1}, {name2}: {len(matches.xy1)} verified matches"
+    picture = draw_matches(
+        photos / name1, photos / name2, matches.xy1, matches.xy2, matches.sizes, caption
+    )
+    save(picture, file)
+    print(f"wrote {file}")

@@ -1,0 +1,203 @@
+"""What became of one photo of a finished output, and why, read back from its files."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pycolmap
+
+from sfm_front.errors import InputError
+from sfm_front.storage.colmap_models import read_model
+from sfm_front.types import Float64Array
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateVerdict:
+    """A candidate as re-ranked: ``inliers`` of re-ranking, None if it was not looked at.
+
+    ``num_verified`` and ``num_matches``: inliers and tentative matches of the verified pair, None
+    if there is none; ``rejected`` says why not, empty if the pair was not matched.
+    """
+
+    name: str
+    cosine: float
+    inliers: int | None
+    num_verified: int | None
+    num_matches: int | None
+    rejected: str
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """One photo's way: ``candidates`` before it arrived, verified pairs with ``later`` photos.
+
+    ``skipped`` is the reason if the file was not used; ``model`` the folder of the largest model
+    that holds the photo, with the number of its points that it sees; ``why_not`` what kept it out.
+    """
+
+    name: str
+    skipped: str
+    num_keypoints: int
+    candidates: tuple[CandidateVerdict, ...]
+    later: Mapping[str, int]
+    model: str | None
+    num_points: int
+    why_not: str
+
+    def __str__(self) -> str:
+        if self.skipped:
+            return f"{self.name}: skipped, {self.skipped}"
+        placed = (
+            f"placed in {self.model}, sees {self.num_points} of its points"
+            if self.model
+            else f"not placed: {self.why_not}"
+        )
+        lines = [f"{self.name}: {placed}", f"{self.num_keypoints} keypoints"]
+        if self.candidates:
+            lines.append("candidates, as re-ranked (cosine, inliers of re-ranking, verdict):")
+        else:
+            lines.append("no candidates: it came first")
+        for candidate in self.candidates:
+            inliers = "-" if candidate.inliers is None else str(candidate.inliers)
+            lines.append(
+                f"  {candidate.name}  {candidate.cosine:.3f}  {inliers:>4}  {_verdict(candidate)}"
+            )
+        if self.later:
+            lines.append("verified with photos that came later (inliers):")
+            lines += [f"  {name}  {inliers}" for name, inliers in self.later.items()]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairMatches:
+    """Verified matches of two photos: ``xy1``, ``xy2`` (M, 2) in pixels of the files, whose
+    ``sizes`` are (width, height)."""
+
+    xy1: Float64Array
+    xy2: Float64Array
+    sizes: tuple[tuple[int, int], tuple[int, int]]
+
+
+def explain(output: Path, name: str) -> Explanation:
+    """Read what became of the photo called ``name`` from a finished output.
+
+    Raises InputError if the output is not a finished one, or has no such photo.
+    """
+    report = _report(output)
+    row = _row(report, name, output)
+    if row["skipped"]:
+        reason = ": ".join(filter(None, row["skipped"].values()))
+        return Explanation(name, reason, 0, (), {}, None, 0, "")
+    with pycolmap.Database.open(output / "database.db") as database:
+        ids = {image.name: image.image_id for image in database.read_all_images()}
+        candidates = tuple(
+            _verdict_of(database, ids, name, candidate) for candidate in _candidates(output, name)
+        )
+        earlier = {candidate.name for candidate in candidates}
+        later = {
+            other: inliers
+            for other, image_id in ids.items()
+            if other not in earlier and (inliers := _num_inliers(database, ids[name], image_id))
+        }
+    model = None if row["model"] is None else report["models"][row["model"]]["path"]
+    return Explanation(
+        name=name,
+        skipped="",
+        num_keypoints=row["keypoints"],
+        candidates=candidates,
+        later=later,
+        model=model,
+        num_points=0 if model is None else _num_points(output / model, ids[name]),
+        why_not=row["why_not_registered"] or "",
+    )
+
+
+def verified_matches(output: Path, name1: str, name2: str) -> PairMatches:
+    """The inliers of two photos' two-view geometry; none if they have no verified pair."""
+    with pycolmap.Database.open(output / "database.db") as database:
+        ids = {image.name: image for image in database.read_all_images()}
+        images = ids[name1], ids[name2]
+        id1, id2 = (image.image_id for image in images)
+        matches = np.zeros((0, 2), np.uint32)
+        if database.exists_two_view_geometry(id1, id2):
+            matches = np.asarray(database.read_two_view_geometry(id1, id2).inlier_matches)
+        xy1, xy2 = (
+            np.asarray(database.read_keypoints(image_id), np.float64)[matches[:, side], :2]
+            for side, image_id in enumerate((id1, id2))
+        )
+        camera1, camera2 = (database.read_camera(image.camera_id) for image in images)
+    sizes = ((camera1.width, camera1.height), (camera2.width, camera2.height))
+    return PairMatches(xy1, xy2, sizes)
+
+
+def _verdict(candidate: CandidateVerdict) -> str:
+    if candidate.num_verified is not None:
+        return f"verified: {candidate.num_verified} of {candidate.num_matches} matches are inliers"
+    return candidate.rejected or "not matched on all features"
+
+
+def _report(output: Path) -> dict[str, Any]:
+    file = output / "report.json"
+    try:
+        content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{output}: no readable report.json in it. Give the output of a finished run."
+        ) from error
+    return content
+
+
+def _row(report: Mapping[str, Any], name: str, output: Path) -> Mapping[str, Any]:
+    rows = {row["name"]: row for row in report["photos"]}
+    if name not in rows:
+        near = difflib.get_close_matches(name, rows, n=3, cutoff=0.3)
+        hint = f"; did you mean {', '.join(near)}?" if near else ""
+        raise InputError(f"{output}: has no photo called {name}{hint}")
+    found: Mapping[str, Any] = rows[name]
+    return found
+
+
+def _candidates(output: Path, name: str) -> list[dict[str, Any]]:
+    with (output / "retrieval.jsonl").open(encoding="utf-8") as lines:
+        for line in lines:
+            content = json.loads(line)
+            if content["name"] == name:
+                found: list[dict[str, Any]] = content["candidates"]
+                return found
+    return []
+
+
+def _verdict_of(
+    database: pycolmap.Database, ids: Mapping[str, int], name: str, candidate: Mapping[str, Any]
+) -> CandidateVerdict:
+    pair = ids[name], ids[candidate["name"]]
+    num_verified = _num_inliers(database, *pair)
+    rejected = candidate.get("rejected")
+    why = ""
+    if rejected:
+        of = "" if rejected["matches"] is None else f" of {rejected['matches']} matches"
+        why = f"{rejected['reason']} ({rejected['inliers']}{of})"
+    return CandidateVerdict(
+        name=candidate["name"],
+        cosine=candidate["cosine"],
+        inliers=candidate["inliers"],
+        num_verified=num_verified,
+        num_matches=len(database.read_matches(*pair)) if num_verified is not None else None,
+        rejected=why,
+    )
+
+
+def _num_inliers(database: pycolmap.Database, id1: int, id2: int) -> int | None:
+    if id1 == id2 or not database.exists_two_view_geometry(id1, id2):
+        return None
+    return len(database.read_two_view_geometry(id1, id2).inlier_matches)
+
+
+def _num_points(model: Path, image_id: int) -> int:
+    return int(read_model(model).image(image_id).num_points3D)

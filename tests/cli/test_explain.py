@@ -1,0 +1,85 @@
+"""Why a photo of a real output was placed, or was not."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+from helpers.locations import VILLAGE
+from PIL import Image
+
+from sfm_front.cli.main import main
+
+NAMES = ("0001.jpg", "0002.jpg", "0003.jpg", "0010.jpg", "0011.jpg")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Five photos of the village, one of noise, one that is no image."""
+    folder = tmp_path_factory.mktemp("photos")
+    for name in NAMES:
+        shutil.copy(VILLAGE / "images" / name, folder / name)
+    noise = np.random.default_rng(0).integers(0, 255, (60, 80, 3), dtype=np.uint8)
+    Image.fromarray(noise).resize((640, 480), Image.Resampling.BICUBIC).save(folder / "noise.png")
+    (folder / "torn.jpg").write_bytes(b"no image")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def output(folder, tmp_path_factory):
+    output = tmp_path_factory.mktemp("out") / "run"
+    argv = ["reconstruct", str(folder), "--output", str(output), "--max-image-size", "800"]
+    assert main([*argv, "--threads", "1"]) == 0
+    return output
+
+
+def test_a_placed_photo_tells_its_model_and_its_verified_candidates(output, capsys):
+    assert main(["explain", str(output), "0002.jpg"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("0002.jpg: placed in sparse/0, sees ")
+    assert int(told[0].split()[-4]) > 50
+    (candidate,) = (line for line in told if line.startswith("  0001.jpg"))
+    assert "verified: " in candidate
+    assert "verified with photos that came later (inliers):" in told
+
+
+def test_a_photo_that_was_not_placed_tells_why(output, capsys):
+    assert main(["explain", str(output), "noise.png"]) == 1
+    told = capsys.readouterr().out
+    assert told.startswith("noise.png: not placed: no verified matches with any photo")
+    assert "too few inliers among the largest features (" in told
+    assert "verified: " not in told
+
+
+def test_a_skipped_file_tells_its_reason(output, capsys):
+    assert main(["explain", str(output), "torn.jpg"]) == 1
+    assert capsys.readouterr().out.startswith("torn.jpg: skipped, not an image")
+
+
+def test_matches_are_drawn(output, folder, tmp_path, capsys):
+    file = tmp_path / "matches.png"
+    argv = ["explain", str(output), "0002.jpg", "--photos", str(folder), "--draw", str(file)]
+    assert main(argv) == 0
+    assert f"wrote {file}" in capsys.readouterr().out
+    with Image.open(file) as picture:
+        assert picture.width > 1000
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["0022.jpg"], "has no photo called 0022.jpg; did you mean"),
+        (["0002.jpg", "--draw", "x.png"], "--draw needs --photos"),
+        (["0002.jpg", "--draw", "x.png", "--photos", "."], "no such photo"),
+    ],
+)
+def test_mistakes_are_one_line(output, capsys, more, told):
+    assert main(["explain", str(output), *more]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert told in line
+
+
+def test_an_output_without_a_report_is_refused(tmp_path, capsys):
+    assert main(["explain", str(tmp_path), "a.jpg"]) == 2
+    assert "no readable report.json" in capsys.readouterr().err
