@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--draw",
         type=Path,
         metavar="FILE.png",
-        help="picture of the verified matches with its most relevant photo; needs --photos",
+        help="picture of the verified matches with its first verified candidate; needs --photos",
     )
     parser.add_argument(
         "--photos", type=Path, metavar="FOLDER", help="the folder that was reconstructed"
@@ -38,8 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
     explanation = explain(arguments.output, arguments.photo)
     print(explanation)
     if arguments.draw is not None:
-        first = next((candidate.name for candidate in explanation.candidates), None)
-        against = arguments.against or first or next(iter(explanation.later), None)
+        verified = [c.name for c in explanation.candidates if c.num_verified is not None]
+        others = [*verified, *(c.name for c in explanation.candidates), *explanation.later]
+        against = arguments.against or next(iter(others), None)
         if against is None:
             raise InputError(f"{arguments.photo}: nothing to draw, it has no candidates")
         explain(arguments.output, against)  # That there is such a photo.

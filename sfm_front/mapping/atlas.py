@@ -1,9 +1,9 @@
-"""Several models at once over one scene: start, grow, join, and settle at the end."""
+"""Several models at once over one view graph, while photos arrive: start, grow, drop."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
@@ -46,12 +46,12 @@ class Atlas:
     takes over what did.
     """
 
-    def __init__(self, scene: ViewGraph, options: AtlasOptions | None = None) -> None:
-        self._view_graph = scene
-        self._options = options or AtlasOptions()
-        self._clock = Stopwatch()
-        self._initializer = Initializer(
-            scene, self._options.initialization, self._options.mapper, self._clock
+    def __init__(self, view_graph: ViewGraph, options: AtlasOptions | None = None) -> None:
+        self.view_graph = view_graph
+        self.options = options or AtlasOptions()
+        self.clock = Stopwatch()
+        self.initializer = Initializer(
+            view_graph, self.options.initialization, self.options.mapper, self.clock
         )
         self._events: list[str] = []
         self.models: list[Model] = []
@@ -65,7 +65,7 @@ class Atlas:
     def waiting(self) -> list[int]:
         """Image ids of the photos that are in no model, in order of arrival."""
         registered = self.registered
-        return [i for i in self._view_graph.image_ids if i not in registered]
+        return [i for i in self.view_graph.image_ids if i not in registered]
 
     @property
     def num_points(self) -> int:
@@ -74,7 +74,7 @@ class Atlas:
 
     def why_not_registered(self, image_id: int) -> str:
         """What keeps a waiting photo out of the models, in words."""
-        neighbors = self._view_graph.neighbors(image_id).keys()
+        neighbors = self.view_graph.neighbors(image_id).keys()
         if not neighbors:
             return "no verified matches with any photo"
         if not neighbors & self.registered:
@@ -84,7 +84,11 @@ class Atlas:
 
     def take_refinement_seconds(self) -> float:
         """Wall seconds that global refinements took since the last call."""
-        return self._clock.seconds.pop("refine", 0.0)
+        return self.clock.seconds.pop("refine", 0.0)
+
+    def note(self, event: str) -> None:
+        """Remember what happened, for ``take_events``."""
+        self._events.append(event)
 
     def take_events(self) -> tuple[str, ...]:
         """What was started, relaxed, restarted or joined since the last call."""
@@ -99,7 +103,7 @@ class Atlas:
         before = self.registered
         for model in self.models:
             model.extend(image_id)
-        self._grow()
+        self.grow()
         if image_id in self.waiting:
             self._start_near(image_id)
         return sorted(self.registered - before)
@@ -113,7 +117,7 @@ class Atlas:
             return None
         model = self.models[0].reconstruction
         camera_id, keypoints = view.camera.camera_id, view.features.keypoints
-        return locate(model, camera_id, keypoints, pairs, self._options.localization)
+        return locate(model, camera_id, keypoints, pairs, self.options.localization)
 
     def poses_of(self, image_ids: Iterable[int]) -> dict[int, PosedCamera]:
         """Cameras and poses of those of these photos that are in the largest model."""
@@ -123,35 +127,21 @@ class Atlas:
         found = {image_id: registered_photo(model, image_id) for image_id in image_ids}
         return {image_id: posed for image_id, posed in found.items() if posed is not None}
 
-    def finish(self) -> None:
-        """Retry what waits, start afresh where the stream began badly, refine everything."""
-        self._refine_until_stable()
-        self._restart_largest()
-        self._start_remaining()
-        self._fix_intrinsics()
-        self._drop_small()
-        while self._register_structure_less():
-            self._refine_until_stable()
-        for model in self.models:
-            model.finish()
-        self.models = [model for model in self.models if model.num_registered > 1]
-        self._drop_covered()
-
-    def _grow(self) -> bool:
+    def grow(self) -> bool:
         """Grow every model, the largest first; True if any grew."""
         grew = False
         for model in list(self.models):
-            grew |= bool(model.grow(self._candidates(model)))
-        self._drop_covered()
+            grew |= bool(model.grow(self.candidates_of(model)))
+        self.drop_covered()
         return grew
 
-    def _candidates(self, model: Model) -> list[int]:
+    def candidates_of(self, model: Model) -> list[int]:
         """Photos that a model may take: the largest those of smaller models, too."""
         if model is self.models[0]:
-            return self._view_graph.image_ids
+            return self.view_graph.image_ids
         return self.waiting
 
-    def _drop_covered(self) -> None:
+    def drop_covered(self) -> None:
         """Sort models by size and drop those that larger ones hold."""
         self.models.sort(key=lambda model: -model.num_registered)
         covered: set[int] = set()
@@ -162,134 +152,19 @@ class Atlas:
                 kept.append(model)
                 covered |= own
             else:
-                self._events.append(
+                self.note(
                     f"model of {model.num_registered} photos dropped: a larger one holds them all"
                 )
         self.models = kept
 
     def _start_near(self, image_id: int) -> None:
         """Start a model among waiting photos linked to this one, if a pair is good enough."""
-        group = self._view_graph.component([image_id], among=set(self.waiting))
-        if self.models and len(group) < self._options.min_second_model:
+        group = self.view_graph.component([image_id], among=set(self.waiting))
+        if self.models and len(group) < self.options.min_second_model:
             return
-        started = self._initializer.start(group)
+        started = self.initializer.start(group)
         if started is not None:
             model, event = started
-            self._events.append(event)
+            self.note(event)
             self.models.append(model)
-            self._grow()
-
-    def _refine_until_stable(self) -> None:
-        """Refine and grow in turn until nothing more registers."""
-        for model in self.models:
-            model.forget_failures()
-        while self._grow():
-            for model in self.models:
-                model.refine()
-                model.forget_failures()
-
-    def _restart_largest(self) -> None:
-        """Where the largest model misses photos linked to it, grow it anew.
-
-        The stream had to take the first pair that would do; the whole graph offers better ones.
-        The better of old and new stays.
-        """
-        failures = 0
-        for fresh, event in self._initializer.best_starts(self._options.fresh_starts):
-            largest = self.models[0] if self.models else None
-            if largest is not None and not self._misses(largest):
-                return
-            fresh.grow(self._view_graph.image_ids)
-            if largest is None or fresh.num_registered > largest.num_registered:
-                self._events.append(f"grown afresh: {event}")
-                self.models.insert(0, fresh)
-                self._refine_until_stable()
-            elif 2 * fresh.num_registered > largest.num_registered:
-                # A start that carried far and still placed no more: another hardly will.
-                failures += 1
-                if failures == self._options.max_failures:
-                    return
-
-    def _fix_intrinsics(self) -> None:
-        """Grow models anew whose photos do not tell what their camera is, with what EXIF says.
-
-        A nadir flight over flat ground leaves focal length and distortion open. On
-        ``uav_garfield_rgb`` they have ended at 23 times the EXIF focal length, and the photos 62 m
-        from GPS in the median, on a site of 185 m; with the camera held 13 m.
-        """
-        miscalibrated = [model for model in self.models if model.is_miscalibrated]
-        held = replace(self._options.mapper, refine_intrinsics=False)
-        initializer = Initializer(self._view_graph, self._options.initialization, held, self._clock)
-        for model in miscalibrated:
-            best = self._best_start(model.registered, initializer)
-            if best is None:
-                continue
-            fresh, event = best
-            if fresh.num_registered >= self._options.min_share * model.num_registered:
-                self._events.append(f"grown afresh, the camera held as EXIF has it: {event}")
-                self.models[self.models.index(model)] = fresh
-        if miscalibrated:
-            self._refine_until_stable()
-
-    def _misses(self, model: Model) -> bool:
-        """Whether photos linked to a model are in none, or too many in others."""
-        linked = self._view_graph.component(model.registered)
-        if len(linked - self.registered) > self._options.max_missed_share * len(linked):
-            return True
-        return model.num_registered < self._options.min_share * len(linked)
-
-    def _start_remaining(self) -> None:
-        """Further models from photos that are linked to each other and fit nowhere."""
-        seen: set[int] = set()
-        for image_id in self.waiting:
-            if image_id in seen or image_id in self.registered:
-                continue
-            group = self._view_graph.component([image_id], among=set(self.waiting))
-            seen |= group
-            if len(group) < self._options.min_model_size:
-                continue
-            best = self._best_start(group, self._initializer)
-            if best is not None:
-                model, event = best
-                self._events.append(event)
-                self.models.append(model)
-                self._refine_until_stable()
-
-    def _best_start(
-        self, group: Collection[int], initializer: Initializer
-    ) -> tuple[Model, str] | None:
-        """Of the models that start within a group, the first to hold most of it, or the largest."""
-        best: tuple[Model, str] | None = None
-        while (started := initializer.start(group, last_call=True)) is not None:
-            model, _ = started
-            model.grow(group)
-            if best is None or _size(model) > _size(best[0]):
-                best = started
-            if model.num_registered >= self._options.min_share * len(group):
-                break
-        return best
-
-    def _register_structure_less(self) -> bool:
-        """Register by two-view geometry alone what sees too few points; True if any was."""
-        placed: list[int] = []
-        for model in self.models:
-            placed += model.register_structure_less(self._candidates(model))
-        if placed:
-            self._events.append(f"{len(placed)} photos registered without structure")
-        return bool(placed)
-
-    def _drop_small(self) -> None:
-        covered: set[int] = set()
-        kept: list[Model] = []
-        for model in self.models:
-            own = model.registered - covered
-            if not kept or len(own) >= self._options.min_model_size:
-                kept.append(model)
-                covered |= own
-            else:
-                self._events.append(f"model with only {len(own)} photos of its own dropped")
-        self.models = kept
-
-
-def _size(model: Model) -> tuple[int, int]:
-    return model.num_registered, model.num_points
+            self.grow()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -35,6 +36,20 @@ class InitialPairConstraints:
     def __post_init__(self) -> None:
         if self.min_points < 1:
             raise ConfigError(f"min_points must be at least 1, got {self.min_points}")
+
+    def applied_to(
+        self, options: pycolmap.IncrementalMapperOptions
+    ) -> pycolmap.IncrementalMapperOptions:
+        """A copy of the options that asks this of an initial pair."""
+        constrained = copy.deepcopy(options)
+        constrained.init_min_tri_angle = self.min_angle_deg
+        constrained.init_min_num_inliers = self.min_inliers
+        constrained.init_max_forward_motion = self.max_forward_motion
+        # What starts with few points can ask no more of the photos that follow.
+        constrained.abs_pose_min_num_inliers = min(
+            options.abs_pose_min_num_inliers, self.min_points
+        )
+        return constrained
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,11 +150,7 @@ class Model:
         self, image_id1: int, image_id2: int, constraints: InitialPairConstraints
     ) -> bool:
         """Start from a pair. False if it yields no model; discard this object then."""
-        self._constrain(constraints)
-        # What starts with few points can ask no more of the photos that follow.
-        self._mapping.abs_pose_min_num_inliers = min(
-            self._mapping.abs_pose_min_num_inliers, constraints.min_points
-        )
+        self._mapping = constraints.applied_to(self._mapping)
         cam2_from_cam1 = self._mapper.estimate_initial_two_view_geometry(
             self._mapping, image_id1, image_id2
         )
@@ -196,8 +207,8 @@ class Model:
 
     def find_initial_pair(self, constraints: InitialPairConstraints) -> tuple[int, int] | None:
         """The best pair of the scene by COLMAP's search; each call gives another, or None."""
-        self._constrain(constraints)
-        found = self._mapper.find_initial_image_pair(self._mapping, -1, -1)
+        options = constraints.applied_to(self._mapping)
+        found = self._mapper.find_initial_image_pair(options, -1, -1)
         return None if found is None else found[0]
 
     def refine(self) -> None:
@@ -243,11 +254,6 @@ class Model:
                 limits.min_focal_length_ratio, limits.max_focal_length_ratio, limits.max_extra_param
             )
         ]
-
-    def _constrain(self, constraints: InitialPairConstraints) -> None:
-        self._mapping.init_min_tri_angle = constraints.min_angle_deg
-        self._mapping.init_min_num_inliers = constraints.min_inliers
-        self._mapping.init_max_forward_motion = constraints.max_forward_motion
 
     def _best(self, waiting: Iterable[int]) -> int | None:
         """The waiting photo with the best spread of visible points, if one is worth a trial."""

@@ -11,6 +11,7 @@ from sfm_front.exporters.colmap import export_models
 from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, resolve
 from sfm_front.mapping.atlas import Atlas
+from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import make_matcher
@@ -136,7 +137,7 @@ class Session(Closeable):
         self._finished = True
         clock = Stopwatch()
         with clock.stage("finish"):
-            self._atlas.finish()
+            finish(self._atlas)
         with clock.stage("export"):
             models = export_models(
                 [model.reconstruction for model in self._atlas.models],

@@ -12,6 +12,7 @@ from helpers.photo_stream import SceneFeed, position_errors_m, registered_names,
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
+from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.model import MapperOptions, Model
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry
@@ -52,7 +53,7 @@ def test_photos_in_order_are_placed_as_they_arrive(orbit):
     assert sorted(ids) == list(range(1, NUM_PHOTOS + 1))
     # Once there is a model, each photo is placed when it comes.
     assert placed[4:] == [[image_id] for image_id in range(5, NUM_PHOTOS + 1)]
-    atlas.finish()
+    finish(atlas)
     assert_whole(atlas, orbit)
 
 
@@ -61,7 +62,7 @@ def test_photos_in_any_order_are_all_placed(orbit, seed):
     order = list(range(NUM_PHOTOS))
     random.Random(seed).shuffle(order)
     atlas = run(SceneFeed(orbit), order)
-    atlas.finish()
+    finish(atlas)
     assert_whole(atlas, orbit)
 
 
@@ -69,7 +70,7 @@ def test_a_stream_that_begins_badly_ends_whole():
     """So few points that the first photos carry no model, or one that does not grow."""
     sparse = make_scene(NUM_PHOTOS, 250, seed=4, layout="orbit")
     atlas = run(SceneFeed(sparse), range(NUM_PHOTOS))
-    atlas.finish()
+    finish(atlas)
     assert_whole(atlas, sparse)
 
 
@@ -77,7 +78,7 @@ def test_photos_with_few_points_are_a_model_when_no_more_will_come():
     poor = make_scene(NUM_PHOTOS, 100, seed=1, layout="orbit", background_ratio=0.0)
     atlas = run(SceneFeed(poor), range(5))
     assert atlas.models == []
-    atlas.finish()
+    finish(atlas)
     assert [model.num_registered for model in atlas.models] == [5]
 
 
@@ -92,7 +93,7 @@ def test_a_camera_that_photos_do_not_tell_is_held(orbit, monkeypatch):
     elsewhere = SceneFeed(other, feed.scene, prefix="b/")
     for index in range(8):
         atlas.add(elsewhere.add(index))
-    atlas.finish()
+    finish(atlas)
     assert [model.registered for model in atlas.models] == [
         set(feed.index_of),
         set(elsewhere.index_of),
@@ -114,7 +115,7 @@ def test_two_places_are_two_models(orbit):
         atlas.add(feed.add(index))
         if index < 8:
             atlas.add(elsewhere.add(index))
-    atlas.finish()
+    finish(atlas)
     assert [model.registered for model in atlas.models] == [
         set(feed.index_of),
         set(elsewhere.index_of),
@@ -133,7 +134,7 @@ def test_models_that_come_to_connect_are_joined(orbit):
     atlas.take_events()
     for index in [5, 6, 7, 13, 14, 15]:
         atlas.add(feed.add(index))
-    atlas.finish()
+    finish(atlas)
     assert_whole(atlas, orbit)
     assert any("a larger one holds them all" in event for event in atlas.take_events())
 
@@ -170,7 +171,7 @@ def test_a_bad_start_is_recovered_from(orbit):
     assert atlas.registered == {1, 2, 3}
     for index in sorted(set(range(NUM_PHOTOS)) - set(feed.PLACES)):
         atlas.add(feed.add(index))
-    atlas.finish()
+    finish(atlas)
     assert_whole(atlas, orbit)
 
 
@@ -178,7 +179,7 @@ def test_a_wrong_focal_length_at_the_start_does_not_last(orbit):
     feed = SceneFeed(orbit)
     feed._camera.params = [2.0 * 1300.0, 800.0, 600.0, 0.0]
     atlas = run(feed, range(NUM_PHOTOS))
-    atlas.finish()
+    finish(atlas)
     assert_whole(atlas, orbit)
     (camera,) = atlas.models[0].reconstruction.cameras.values()
     assert camera.mean_focal_length() == pytest.approx(1300, rel=0.02)
@@ -190,7 +191,7 @@ def test_what_is_linked_to_nothing_says_so(orbit):
     stranger = SceneFeed(make_scene(4, 100, seed=7), feed.scene, prefix="b/")
     image_id = stranger.add(0)
     assert atlas.add(image_id) == []
-    atlas.finish()
+    finish(atlas)
     assert atlas.waiting == [image_id]
     assert atlas.why_not_registered(image_id) == "no verified matches with any photo"
 
@@ -203,7 +204,7 @@ def test_two_photos_that_know_only_each_other_say_so(orbit):
     for index in (0, 1):
         ids.append(pair.add(index))
         atlas.add(ids[-1])
-    atlas.finish()
+    finish(atlas)
     assert atlas.waiting == ids
     assert {atlas.why_not_registered(image_id) for image_id in ids} == {
         "verified matches only with photos that are not registered"
@@ -222,7 +223,7 @@ def test_an_atlas_without_photos_or_matches_ends_without_models():
     assert atlas.waiting == []
     stranger = SceneFeed(make_scene(1, 50, seed=8))
     alone = run(stranger, [0])
-    alone.finish()
+    finish(alone)
     assert alone.models == []
     assert registered_names([]) == set()
     assert alone.why_not_registered(1) == "no verified matches with any photo"
