@@ -16,9 +16,10 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from sfm_front.cli import arguments as shared
-from sfm_front.cli.progress import ProgressLine, closing_summary
+from sfm_front.cli.progress import ProgressLine
 from sfm_front.errors import ConfigError
 from sfm_front.photos.source import list_photos, order_photos
+from sfm_front.reports.summary import closing_summary
 
 if TYPE_CHECKING:
     from sfm_front.session.options import SessionOptions

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from sfm_front.cli import progress
-from sfm_front.cli.progress import CountLine, ProgressLine, closing_summary
+from sfm_front.cli.progress import CountLine, ProgressLine
+from sfm_front.reports.summary import closing_summary
 from sfm_front.types import Skipped, SkipReason, StepReport
 
 
