@@ -8,24 +8,54 @@ from __future__ import annotations
 # pycolmap's wheels export a zlib of their own; loaded before Python's, it breaks compression in
 # the whole process.
 import zlib  # noqa: F401
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sfm_front.errors import (
+        ConfigError,
+        DependencyError,
+        InputError,
+        SfmFrontError,
+        WeightsError,
+    )
     from sfm_front.session.options import SessionOptions
     from sfm_front.session.session import Session
+    from sfm_front.types import ModelSummary, PhotoPath, Skipped, StepReport
 
 __version__ = "0.1.0"
-__all__ = ["Session", "SessionOptions", "__version__"]
+__all__ = [
+    "ConfigError",
+    "DependencyError",
+    "InputError",
+    "ModelSummary",
+    "PhotoPath",
+    "Session",
+    "SessionOptions",
+    "SfmFrontError",
+    "Skipped",
+    "StepReport",
+    "WeightsError",
+    "__version__",
+]
+
+# Loaded when asked for: pycolmap and OpenCV would delay the answer of --help.
+_MODULES = {
+    "ConfigError": "errors",
+    "DependencyError": "errors",
+    "InputError": "errors",
+    "ModelSummary": "types",
+    "PhotoPath": "types",
+    "Session": "session.session",
+    "SessionOptions": "session.options",
+    "SfmFrontError": "errors",
+    "Skipped": "types",
+    "StepReport": "types",
+    "WeightsError": "errors",
+}
 
 
 def __getattr__(name: str) -> Any:
-    # Loaded when asked for: pycolmap and OpenCV would delay the answer of --help.
-    if name == "Session":
-        from sfm_front.session.session import Session
-
-        return Session
-    if name == "SessionOptions":
-        from sfm_front.session.options import SessionOptions
-
-        return SessionOptions
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"sfm_front.{_MODULES[name]}"), name)

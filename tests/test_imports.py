@@ -9,6 +9,8 @@ import sys
 import pytest
 from helpers.locations import ROOT
 
+import sfm_front
+
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -38,3 +40,11 @@ def test_the_session_needs_no_module_of_unix_alone():
     code = f"import sys\nfor name in {missing}: sys.modules[name] = None\n"
     done = run(code + "from sfm_front import Session\nprint(Session.__name__)")
     assert done.stdout == "Session\n", done.stderr[-500:]
+
+
+def test_every_public_name_is_there():
+    for name in sfm_front.__all__:
+        assert getattr(sfm_front, name) is not None
+    assert set(sfm_front._MODULES) == set(sfm_front.__all__) - {"__version__"}
+    with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
+        _ = sfm_front.Nothing
