@@ -1,4 +1,4 @@
-"""Photos → features and global vectors, several photos at a time and none of it done twice."""
+"""Photos → features and global vectors, in parallel and cached on disk."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ from sfm_front.types import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedPhoto:
-    """A described photo, and its vectors by the names of the descriptors.
+    """An extracted photo and its global vectors by descriptor name.
 
-    ``photo.global_vector`` is that of the first descriptor.
+    ``photo.global_vector`` is the first descriptor's.
     """
 
     photo: ExtractedPhoto
@@ -43,7 +43,7 @@ class CachedPhoto:
 
 
 class CachedExtraction:
-    """Describes photos; what is already in its folder is read from there. Threads may share it."""
+    """Extracts features and global vectors, reusing those cached in its folder. Thread-safe."""
 
     def __init__(
         self,
@@ -67,10 +67,10 @@ class CachedExtraction:
     def describe(
         self, photo: PhotoPath, box: Box | None = None, *, digest: str | None = None
     ) -> CachedPhoto | Skipped:
-        """Describe a photo, or the part of it in ``box``; keypoints are those of the whole file.
+        """Describe a photo, or the part of it in ``box``; keypoints are in pixels of the file.
 
-        ``digest``: that of the file, where it is known already. Raises InputError where
-        the folder cannot be written to.
+        ``digest``: the file's, if already known. Raises InputError if the folder cannot be
+        written to.
         """
         known = digest or file_digest(photo.path, photo.name)
         if isinstance(known, Skipped):
@@ -103,7 +103,7 @@ class CachedExtraction:
         *,
         num_threads: int,
     ) -> Iterator[CachedPhoto | Skipped]:
-        """Describe photos in order, ``num_threads`` of them at a time; ``boxes`` by name."""
+        """Describe photos in order, ``num_threads`` at a time; ``boxes`` by photo name."""
 
         def describe(photo: PhotoPath) -> CachedPhoto | Skipped:
             return self.describe(photo, None if boxes is None else boxes.get(photo.name))
@@ -113,7 +113,7 @@ class CachedExtraction:
     def _make(
         self, photo: PhotoPath, box: Box | None, keys: CacheKeys
     ) -> tuple[CachedFeatures, list[Float32Array]] | Skipped:
-        """Describe a photo, except for what is stored of it, and store the rest."""
+        """Compute what is not cached yet of a photo's description, and cache it."""
         read = self._reader.read(photo.path, photo.name)
         if isinstance(read, Skipped):
             return read
@@ -136,9 +136,9 @@ class CachedExtraction:
 
 
 def crop(photo: Photo, box: Box) -> tuple[Photo, tuple[float, float]]:
-    """The part of a photo in ``box`` as a photo of its own, and its left and top in the file.
+    """Crop a photo to ``box``; returns the crop and its left and top in pixels of the file.
 
-    At least one working pixel is left; ``width`` and ``height`` become the part's in the file.
+    The crop has at least one working pixel; its ``width`` and ``height`` are in pixels of the file.
     """
     height, width = photo.pixels.shape[:2]
     per_column, per_row = photo.width / width, photo.height / height

@@ -1,4 +1,4 @@
-"""SIFT by COLMAP itself: the faster one where pycolmap was built with CUDA."""
+"""COLMAP's own SIFT: the faster one if pycolmap was built with CUDA."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sfm_front.types import Features, Float32Array, Photo
 
 
 class ColmapSift:
-    """Finds the SIFT keypoints of a photo. Safe to share between threads, which take turns."""
+    """Finds the SIFT keypoints of a photo. Thread-safe; calls are serialised."""
 
     name = "colmap-sift"
 
     def __init__(self, max_features: int = 4000, *, on_gpu: bool = True) -> None:
-        """``max_features``: keypoints sought, those of largest scale first; COLMAP keeps the level
-        of scale in which it reaches them whole."""
+        """``max_features``: number of keypoints, largest scale first; COLMAP may return more, since
+        it keeps the last scale level whole."""
         self.max_features = max_features
         options = pycolmap.FeatureExtractionOptions()
         options.use_gpu = on_gpu
@@ -29,7 +29,7 @@ class ColmapSift:
         self._lock = Lock()
 
     def extract(self, photo: Photo) -> Features:
-        """Keypoints in pixels of the file, largest first; none in a photo without texture."""
+        """Keypoints in pixels of the file, largest first; none if there is no texture."""
         bitmap = pycolmap.Bitmap.from_array(photo.pixels).clone_as_grey()
         with self._lock:
             found, descriptors = self._extractor.extract(bitmap)

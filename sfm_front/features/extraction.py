@@ -1,4 +1,4 @@
-"""Photos → DescribedPhotos: SIFT and the global vector side by side, the next photos ahead."""
+"""Photos → ExtractedPhotos: SIFT and the global vector in parallel, photos prefetched."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 
 class FeatureExtractor(Protocol):
-    """Finds the SIFT features of a photo; threads may share it.
+    """Extracts the SIFT features of a photo. Thread-safe.
 
-    ``name`` tells apart extractors whose features must not be mixed.
+    Features of extractors with different ``name`` must not be mixed.
     """
 
     @property
@@ -40,7 +40,7 @@ class FeatureExtractor(Protocol):
 
 
 def make_extractor(device: str, max_features: int) -> SiftExtractor | ColmapSift:
-    """SIFT for a device that ``devices.usable_device`` has given: COLMAP's on a GPU if it can."""
+    """SIFT for a device from ``devices.usable_device``: COLMAP's on a GPU if available."""
     if device == "cuda":
         import pycolmap
 
@@ -54,8 +54,8 @@ def make_extractor(device: str, max_features: int) -> SiftExtractor | ColmapSift
 class FeatureExtraction(Closeable):
     """Reads photos and describes them, several at a time.
 
-    Of one photo, SIFT and the global vector's pixel share are computed in two parallel threads,
-    as in the paper; VLAD follows SIFT.
+    SIFT and the network part of the global vector run in two parallel threads per photo, as in
+    the paper; VLAD follows SIFT.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class FeatureExtraction(Closeable):
         *,
         num_threads: int,
     ) -> None:
-        """``num_threads``: photos described at a time."""
+        """``num_threads``: number of photos described in parallel."""
         self._reader = reader
         self._sift = sift
         self._global = global_descriptor
@@ -75,7 +75,7 @@ class FeatureExtraction(Closeable):
         self._streams: WeakSet[Generator[ExtractedPhoto | Skipped, None, None]] = WeakSet()
 
     def describe(self, photo: PhotoPath) -> ExtractedPhoto | Skipped:
-        """Read one photo and describe it in the calling thread, networks in a second one."""
+        """Read and describe one photo in the calling thread; networks run in a second one."""
         clock = Stopwatch()
         with clock.stage("read"):
             read = self._reader.read(photo.path, photo.name)
@@ -102,7 +102,7 @@ class FeatureExtraction(Closeable):
         )
 
     def stream(self, photos: Iterable[PhotoPath]) -> Iterator[ExtractedPhoto | Skipped]:
-        """Describe photos in order, up to twice as many ahead as are worked on at a time."""
+        """Describe photos in order, prefetching up to twice ``num_threads``."""
         stream = prefetch(self.describe, photos, num_threads=self._num_threads)
         self._streams.add(stream)
         return stream
@@ -114,7 +114,7 @@ class FeatureExtraction(Closeable):
             return self._global.describe_pixels(photo.pixels)
 
     def close(self) -> None:
-        # One that is still held would leave OpenCV and matrix products on one thread.
+        # A stream left open would keep OpenCV and matrix products on one thread.
         for stream in tuple(self._streams):
             stream.close()
         self._networks.shutdown(cancel_futures=True)

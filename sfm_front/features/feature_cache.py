@@ -1,4 +1,4 @@
-"""What photos were described by, on disk: features and global vectors by what they depend on."""
+"""Features and global vectors on disk, keyed by everything they depend on."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _DECISIVE_CODE = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedFeatures:
-    """Size of a photo's file, what its camera wrote, and its SIFT features."""
+    """Size of a photo in pixels of the file, its EXIF, and its SIFT features."""
 
     width: int
     height: int
@@ -50,7 +50,7 @@ class CachedFeatures:
 
 @dataclass(frozen=True, slots=True)
 class CacheKeys:
-    """Where a photo's description is kept: its features, and a vector for each descriptor."""
+    """Cache keys of a photo: of its features, and of one vector per descriptor."""
 
     features: str
     vectors: tuple[str, ...]
@@ -58,9 +58,9 @@ class CacheKeys:
 
 @dataclass(frozen=True, slots=True)
 class ExtractionSettings:
-    """All that decides what features and vectors a photo has, apart from its bytes.
+    """Everything that features and vectors depend on besides the photo's bytes.
 
-    ``fingerprints`` are those of the global descriptors.
+    ``fingerprints``: the global descriptors'.
     """
 
     max_image_size: int
@@ -70,7 +70,7 @@ class ExtractionSettings:
     fingerprints: tuple[str, ...]
 
     def keys(self, digest: str, box: Box | None = None) -> CacheKeys:
-        """Keys of the photo whose bytes have ``digest``, or of the part in ``box``."""
+        """Keys of the photo with this ``digest``, or of its part in ``box``."""
         # Another release of OpenCV may find other keypoints.
         local = (
             _FORMAT,
@@ -89,14 +89,14 @@ class ExtractionSettings:
 
 
 class FeatureCache:
-    """A folder of descriptions that several sessions, settings and descriptors may share."""
+    """A cache folder that sessions, settings and descriptors may share."""
 
     def __init__(self, folder: Path) -> None:
         self._features = ArrayFiles(folder / "features")
         self._vectors = ArrayFiles(folder / "vectors")
 
     def has(self, keys: CacheKeys) -> bool:
-        """Whether there are files for features and every vector; they may be damaged."""
+        """Whether features and every vector have a file; it may be damaged."""
         return self._features.has(keys.features) and all(map(self._vectors.has, keys.vectors))
 
     def load_local(self, key: str) -> CachedFeatures | None:
@@ -127,7 +127,7 @@ class FeatureCache:
         return None if vector is None or vector.dtype != np.float32 else vector
 
     def load_vectors(self, keys: CacheKeys) -> list[Float32Array] | None:
-        """Every vector of a photo; None where any of them is not there whole."""
+        """All vectors of a photo; None if any is absent or damaged."""
         vectors = [self.load_vector(key) for key in keys.vectors]
         there = [vector for vector in vectors if vector is not None]
         return there if len(there) == len(vectors) else None
@@ -136,7 +136,7 @@ class FeatureCache:
         self._vectors.save(key, {"vector": vector})
 
     def keep_only(self, kept: Iterable[CacheKeys]) -> None:
-        """Remove every other description."""
+        """Remove all other entries."""
         kept = list(kept)
         self._features.keep_only({keys.features for keys in kept})
         self._vectors.keep_only({key for keys in kept for key in keys.vectors})
@@ -144,8 +144,8 @@ class FeatureCache:
 
 @lru_cache
 def _code_digest() -> str:
-    """Of the code that decides what features and vectors are: a number to be raised with each
-    change of it would be forgotten, and photos described by different code do not match."""
+    """Hash of the code that computes features and vectors. A version number bumped by hand would
+    be forgotten, and features of different code do not match."""
     digest = hashlib.blake2b(digest_size=16)
     for name in _DECISIVE_CODE:
         digest.update(files("sfm_front").joinpath(name).read_bytes())

@@ -10,37 +10,35 @@ from sfm_front.errors import ConfigError
 from sfm_front.types import Features, Float32Array, Photo, Uint8Array
 
 DESCRIPTOR_SCALE = 512.0
-# How many keypoints, by response, are described for each one that is kept by scale.
+# Keypoints described, by response, per keypoint kept, by scale.
 _DESCRIBED_PER_KEPT = 4
-# A photo with fewer pixels has few places to begin with: fainter ones are taken too, as faint as
-# COLMAP's. Of larger ones there are enough, and finding more takes half as long again.
+# Smaller photos have few keypoints: COLMAP's lower contrast threshold finds fainter ones. Larger
+# photos have enough (TUNING: small-photo-contrast).
 _SMALL_PHOTO_PX = 1_000_000
 _CONTRAST, _SMALL_PHOTO_CONTRAST = 0.04, 0.02
 
 
 class SiftExtractor:
-    """Finds the SIFT keypoints of a photo. Safe to share between threads.
+    """Finds the SIFT keypoints of a photo. Thread-safe.
 
-    The keypoints of largest scale are kept, as in COLMAP: they are found again from other
-    distances, where those of strongest response are mostly of the finest scale. On
-    ``sceaux_castle`` it made 87 to 271 inliers of 0 to 24 between the last photo, a zoom, and
-    three of those before it.
+    Keeps the keypoints of largest scale, as COLMAP does: they repeat across viewing distances,
+    while the strongest responses are mostly at the finest scale (TUNING: keep-by-scale).
     """
 
     name = "opencv-sift"
 
     def __init__(self, max_features: int = 4000) -> None:
-        """``max_features``: places kept a photo; one with several orientations counts once, as
-        in COLMAP. Raises ConfigError if it is below 1.
+        """``max_features``: keypoint locations kept per photo; one with several orientations counts
+        once, as in COLMAP. Raises ConfigError if it is below 1.
         """
         if max_features < 1:
             raise ConfigError(f"max_features must be at least 1, got {max_features}")
         self.max_features = max_features
 
     def extract(self, photo: Photo) -> Features:
-        """Keypoints in pixels of the file, largest first; none in a photo without texture."""
+        """Keypoints in pixels of the file, largest first; none if there is no texture."""
         gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
-        # A detector for each call: OpenCV does not promise that one may be shared by threads.
+        # One detector per call: OpenCV does not promise thread safety.
         detector = cv2.SIFT.create(
             nfeatures=_DESCRIBED_PER_KEPT * self.max_features,
             contrastThreshold=_SMALL_PHOTO_CONTRAST if gray.size < _SMALL_PHOTO_PX else _CONTRAST,
@@ -65,7 +63,7 @@ class SiftExtractor:
 
 
 def _largest(working: Float32Array, response: Float32Array, count: int) -> NDArray[np.intp]:
-    """Indices of the keypoints at the ``count`` places of largest scale, then response."""
+    """Indices of the keypoints at the ``count`` locations of largest scale, then response."""
     order = np.lexsort((-response, -working[:, 2]))
     places = working[order, :3]
     is_new = np.ones(len(order), np.bool_)
@@ -87,7 +85,7 @@ def root_sift(raw: Float32Array) -> Uint8Array:
 
 
 def _to_file_pixels(working: Float32Array, photo: Photo) -> Float32Array:
-    """x, y, diameter, degrees at working size → x, y, scale, radians at the size of the file.
+    """x, y, diameter, degrees at working size → x, y, scale, radians in pixels of the file.
 
     OpenCV centres the top-left pixel at (0, 0), COLMAP at (0.5, 0.5).
     """
@@ -101,7 +99,7 @@ def _to_file_pixels(working: Float32Array, photo: Photo) -> Float32Array:
 
 
 def enlarged(photo: Photo) -> tuple[float, float]:
-    """How many times wider and higher the file is than the pixels in memory."""
+    """Scale factors in x and y from working pixels to pixels of the file."""
     height, width = photo.pixels.shape[:2]
     return photo.width / width, photo.height / height
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from sfm_front.features.global_descriptors.networks import DescriptorNetwork
 
-# Of the photos of ImageNet, RGB in [0, 1]: what all three networks were trained with.
+# ImageNet statistics, RGB in [0, 1], which all three networks were trained with.
 MEAN_RGB = np.array([0.485, 0.456, 0.406], np.float32)
 STD_RGB = np.array([0.229, 0.224, 0.225], np.float32)
 
@@ -31,10 +31,10 @@ SHORTEST_SIDE_PX = 64
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A network that can be named: where it is, where its weights are, what it is shown.
+    """A named network: its class, its weights and its input size.
 
-    ``class_name`` is looked up in ``networks`` only when it is needed, because that loads torch.
-    ``longer_side_px`` is the size that photos are reduced to.
+    ``class_name`` is looked up in ``networks`` on first use only, because that loads torch.
+    ``longer_side_px``: size that photos are reduced to.
     """
 
     class_name: str
@@ -43,11 +43,7 @@ class Network:
     longer_side_px: int
 
 
-# Sizes: over 369 photos of 14 scenes MobileNetV2 reached mAP 0.858 at 224 px, 0.873 at 320, 0.876
-# at 384, 0.871 at 640, and 0.839 on the usual 224 px crop. At 320 px, instead of the average: GeM
-# with exponent 2 0.867, 3 0.862, 4 0.859, the maximum 0.855; whitening learnt on other scenes gave
-# 0.880, not worth a file of its size. ResNet101 costs a CPU core 0.46 s a photo at 320 px: it is
-# shown 224, 0.29 s.
+# Above 320 px accuracy hardly grows; ResNet101 gets 224 px to save time (TUNING: network-size).
 _MODELS = "https://download.pytorch.org/models"
 
 NETWORKS: Mapping[str, Network] = MappingProxyType(
@@ -66,7 +62,7 @@ NETWORKS: Mapping[str, Network] = MappingProxyType(
 
 
 class CnnDescriptor:
-    """Describes photos by one network. Safe to share between threads."""
+    """Describes photos by one network. Thread-safe."""
 
     def __init__(self, name: str, *, weights: Path, device: str = "cpu") -> None:
         """``name`` is one of ``NETWORKS``, ``weights`` its file, ``device`` as torch names it.
@@ -97,13 +93,13 @@ class CnnDescriptor:
 def preprocess(pixels: Uint8Array, longer_side_px: int) -> Float32Array:
     """(h, w, 3) uint8 RGB → (1, 3, H, W) float32: the whole photo, reduced and normalised.
 
-    Nothing is cropped: what two photos share is often at their borders. The longer side becomes
+    Nothing is cropped: photos often overlap at their borders. The longer side becomes
     ``longer_side_px`` if it is above that; a side never falls below ``SHORTEST_SIDE_PX``.
     """
     height, width = pixels.shape[:2]
     scale = min(1.0, longer_side_px / max(height, width))
     size = tuple(max(SHORTEST_SIDE_PX, round(side * scale)) for side in (width, height))
-    # Leaves a photo of that size as it is.
+    # A photo of that size stays unchanged.
     reduced = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
     normalised = (reduced.astype(np.float32) / 255.0 - MEAN_RGB) / STD_RGB
     return np.ascontiguousarray(normalised.transpose(2, 0, 1)[np.newaxis])
@@ -122,7 +118,7 @@ def _load(
             f"torch cannot be loaded ({error}). Install it, or use --global-descriptor vlad."
         ) from error
     device = _device(device_name)
-    # Built without memory: every parameter that is used comes from the file.
+    # Built without storage: every parameter in use comes from the file.
     with torch.device("meta"):
         module: DescriptorNetwork = getattr(networks, network.class_name)()
     expected = weights_cache.file_name(network.weights_url)

@@ -1,4 +1,4 @@
-"""What VLAD has learnt of SIFT descriptors: a small file that ships with the package."""
+"""VLAD's learnt codebook: a small file that ships with the package."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Float16Array = NDArray[np.float16]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Codebook:
-    """Visual words and how photos use them, float16 because it ships with the package.
+    """Visual words and their whitening, float16 to keep the shipped file small.
 
     ``mean`` (128,) is subtracted from a descriptor, ``projection`` (128, d) reduces what remains
     and whitens it by half, ``words`` (k, d) are the centres of the clusters there. ``whitening``
-    (k, d, d) holds a lower triangular matrix for each word, which maps what photos have at that
-    word to numbers of equal variance, not correlated with each other.
+    (k, d, d) holds one lower triangular matrix per word, which decorrelates the residuals at that
+    word and gives them equal variance.
     """
 
     mean: Float16Array
@@ -53,8 +53,7 @@ class Codebook:
 
     @property
     def fingerprint(self) -> str:
-        """Eight hexadecimal digits; vectors made with codebooks that differ in them are strangers
-        to each other."""
+        """Eight hexadecimal digits; vectors of codebooks with different ones are not comparable."""
         digest = hashlib.sha256()
         for array in astuple(self):
             digest.update(repr(array.shape).encode())

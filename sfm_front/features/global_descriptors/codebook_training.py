@@ -1,4 +1,4 @@
-"""Learn a codebook from the features of a collection of photos."""
+"""Learn a codebook from the features of many photos."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sfm_front.types import Features, Float32Array, Float64Array, Uint8Array
 
 KMEANS_ROUNDS = 25
 KMEANS_POINTS_PER_WORD = 400
-"""Beyond this many descriptors a word, k-means learns from a sample."""
+"""With more descriptors per word than this, k-means learns from a sample."""
 
 DAMPING = 0.2
-"""Added to the variances that whitening divides by, as a share of their mean: what few photos
-show of the weak directions is not to be trusted. From 0.03 to 0.3 mAP changed by 0.002."""
+"""Added to the variances that whitening divides by, as a share of their mean: few photos estimate
+weak directions badly. Its value matters little (TUNING: codebook-damping)."""
 
 
 def train_codebook(
@@ -32,8 +32,8 @@ def train_codebook(
 ) -> Codebook:
     """Features of many photos → Codebook; the same for the same input and seed.
 
-    Projection and words are learnt from ``per_photo`` descriptors of each photo, drawn at random,
-    the whitening from what each photo as a whole has at each word.
+    Projection and words are learnt from ``per_photo`` random descriptors per photo, the whitening
+    from the summed residuals of each whole photo at each word.
 
     Raises:
         ConfigError: sizes out of range, or fewer descriptors than words.
@@ -68,8 +68,8 @@ def _principal_axes(descriptors: Uint8Array, dimension: int) -> tuple[Float32Arr
     """Mean (128,) of the descriptors, and the projection (128, dimension) on their strongest
     principal components, each divided by the square root of its standard deviation.
 
-    That is half of a whitening: none of it lets the strong components decide alone which word is
-    nearest, all of it lifts the noise of the weak ones.
+    This is half a whitening: without it the strong components alone decide which word is nearest;
+    a full one amplifies the noise of the weak ones.
     """
     points = descriptors.astype(np.float32)
     mean: Float32Array = points.mean(axis=0)
@@ -82,7 +82,7 @@ def _principal_axes(descriptors: Uint8Array, dimension: int) -> tuple[Float32Arr
 
 
 def _cluster(points: Float32Array, num_words: int, seed: int) -> Float32Array:
-    """(N, d) → the centres (num_words, d) of its clusters."""
+    """(N, d) → (num_words, d) cluster centres."""
     kmeans = faiss.Kmeans(
         points.shape[1],
         num_words,
@@ -99,8 +99,8 @@ def _whitening(words: VisualWords, photos: Sequence[Features]) -> Float64Array:
     """(k, d, d): for each word the inverse of the Cholesky factor of the second moments that the
     photos' directions have there.
 
-    Of second moments, not of covariances: what all photos have in common at a word is its
-    strongest direction, and says least about a photo.
+    Second moments, not covariances: what all photos share at a word is its strongest direction and
+    distinguishes them least.
     """
     moments = np.zeros((words.count, words.dimension, words.dimension))
     for photo in photos:

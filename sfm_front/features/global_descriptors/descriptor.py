@@ -1,4 +1,4 @@
-"""Global vectors by name: one description, or several joined into one vector.
+"""Global vectors by name: one descriptor, or several joined into one vector.
 
 A joined vector holds its parts side by side, each of length 1 times the square root of its weight,
 so that the cosine of two photos is the weighted mean of the cosines of their parts.
@@ -24,11 +24,9 @@ AUTO = "auto"
 NAMES = (*NETWORKS, Vlad.name)
 
 AUTO_NETWORK = "resnet101_pool5"
-"""The network that ``auto`` joins with VLAD where it can: the paper's."""
+"""The paper's network, which ``auto`` joins with VLAD if available."""
 
-# With MobileNetV2, measured as in ``vlad``: mAP 0.912 and 0.931 without it, 0.931 and 0.933 at a
-# weight of 0.1, 0.931 and 0.932 at 0.2, 0.928 and 0.930 at 0.3, 0.924 and 0.926 at 0.4. Recall at
-# 25 is best at 0.2: 0.957, where VLAD alone has 0.941.
+# Best recall at 25 with MobileNetV2; ResNet101 was not measured (TUNING: vlad-weight).
 VLAD_WEIGHT = 0.8
 NETWORK_WEIGHT = 0.2
 
@@ -47,7 +45,7 @@ class GlobalDescriptorPart(Protocol[Source_contra]):
 
     @property
     def fingerprint(self) -> str:
-        """The same for two describers only if their vectors can be compared."""
+        """Equal for two descriptors only if their vectors are comparable."""
         ...
 
     def describe(self, source: Source_contra, /) -> Float32Array:
@@ -58,8 +56,8 @@ class GlobalDescriptorPart(Protocol[Source_contra]):
 class GlobalDescriptor:
     """What a photo is retrieved by: (dimension,) float32 of length 1, compared by cosine.
 
-    The pixels' share and the features' share can be computed apart, so that networks run beside
-    SIFT; ``join`` makes the vector of both. Safe to share between threads.
+    The parts from pixels and from features can be computed separately, so that networks run in
+    parallel to SIFT; ``join`` combines them. Thread-safe.
     """
 
     def __init__(
@@ -68,7 +66,7 @@ class GlobalDescriptor:
         networks: Sequence[GlobalDescriptorPart[Uint8Array]] = (),
         local: Sequence[GlobalDescriptorPart[Features]] = (),
     ) -> None:
-        """``networks`` describe pixels, ``local`` describe features; one in all at least."""
+        """``networks`` describe pixels, ``local`` describe features; at least one in total."""
         parts: list[GlobalDescriptorPart[Any]] = [*networks, *local]
         self.name = "+".join(part.name for part in parts)
         self.dimension = sum(part.dimension for part in parts)
@@ -81,20 +79,20 @@ class GlobalDescriptor:
         self._local_factor = np.float32((VLAD_WEIGHT / total) ** 0.5)
 
     def describe_pixels(self, pixels: Uint8Array) -> Float32Array:
-        """(h, w, 3) uint8 RGB → the networks' share; empty if no part needs pixels."""
+        """(h, w, 3) uint8 RGB → the networks' part; empty if there is none."""
         vectors = [part.describe(pixels) for part in self._networks]
         share: Float32Array = self._network_factor * _side_by_side(vectors)
         return share
 
     def describe_local(self, features: Features) -> Float32Array:
-        """SIFT features → VLAD's share; empty if no part needs features."""
+        """SIFT features → VLAD's part; empty if there is none."""
         vectors = [part.describe(features) for part in self._local]
         share: Float32Array = self._local_factor * _side_by_side(vectors)
         return share
 
     def join(self, of_pixels: Float32Array, of_features: Float32Array) -> Float32Array:
-        """Both shares → (dimension,) float32 of length 1."""
-        # Not of length 1 already where a photo without features has no VLAD.
+        """Both parts → (dimension,) float32 of length 1."""
+        # Not yet of length 1 if a photo has no features and so no VLAD.
         return unit_length(np.concatenate([of_pixels, of_features]))
 
     def describe(self, pixels: Uint8Array, features: Features) -> Float32Array:
@@ -112,13 +110,13 @@ def resolve(
     """The descriptor called ``name``, and what to tell the user about the choice, if anything.
 
     ``name`` is one of ``NAMES``, several joined by ``+``, or ``auto``: ResNet101 joined with VLAD
-    if its weights are in the cache or can be had, else VLAD. ``weights`` is a file for the network
-    to use in place of the official one; ``progress`` hears of a download.
+    if its weights are cached or can be downloaded, else VLAD. ``weights`` replaces the network's
+    official file; ``progress`` is called during a download.
 
     Raises:
         ConfigError: no such name, one twice, or ``weights`` without exactly one network.
-        WeightsError: weights that were asked for by name or file cannot be had or used.
-        DependencyError: torch, asked for by a network's name, cannot be loaded.
+        WeightsError: weights requested by name or file are unavailable or unusable.
+        DependencyError: a network was requested and torch cannot be loaded.
     """
     if name == AUTO:
         return _automatic(weights, device, progress)

@@ -2,8 +2,8 @@
 
 Parameter names and order of layers are torchvision's, so that its weights files load as they are.
 ``forward`` maps a batch (B, 3, H, W) float32, normalised with the mean and deviation of ImageNet,
-to descriptors (B, D) float32 of any length. H and W are free. The classifier of each network (its
-``HEAD``) is part of the module, so that a whole file finds its place, but is never run.
+to descriptors (B, D) float32 of any norm. H and W are free. The classifier of each network (its
+``HEAD``) is part of the module, so that a complete file loads, but is never run.
 
 Sources: Krizhevsky, "One weird trick for parallelizing convolutional neural networks", 2014
 (AlexNet); He et al., "Deep residual learning for image recognition", CVPR 2016 (ResNet101);
@@ -163,7 +163,7 @@ class InvertedResidual(nn.Module):
 
 
 class MobileNetV2(DescriptorNetwork):
-    """MobileNetV2 up to the average of its last feature map (1280 numbers)."""
+    """MobileNetV2 up to the average of its last feature map (TUNING: network-pooling)."""
 
     DIMENSION = 1280
     HEAD = "classifier."

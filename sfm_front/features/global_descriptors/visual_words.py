@@ -1,4 +1,4 @@
-"""A photo's SIFT features → what they have in common at each visual word."""
+"""A photo's SIFT features → their mean residual direction at each visual word."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sfm_front.types import Features, Float32Array, Uint8Array
 
 
 class VisualWords:
-    """Centres of clusters of projected descriptors. Safe to share between threads."""
+    """Centres of clusters of projected descriptors. Thread-safe."""
 
     def __init__(
         self,
@@ -27,21 +27,21 @@ class VisualWords:
         self.count, self.dimension = self._words.shape
 
     def project(self, descriptors: Uint8Array) -> Float32Array:
-        """(N, 128) uint8 RootSIFT → (N, d) float32, where the words are."""
+        """(N, 128) uint8 RootSIFT → (N, d) float32, the space of the words."""
         points: Float32Array = descriptors.astype(np.float32) @ self._projection
         points -= self._projected_mean
         return points
 
     def directions(self, features: Features) -> Float32Array:
-        """(k, d) float32: at each word the direction in which the descriptors nearest to it lie,
-        of length 1, or zeros at a word without any."""
+        """(k, d) float32: per word the unit direction of the summed residuals of its descriptors;
+        zeros at a word without any."""
         points = self.project(features.descriptors)
         nearness = points @ self._words.T
         # In place: a second array of this size would take as long as the product.
         nearness -= self._half_squares
         nearest = nearness.argmax(axis=1)
         residuals = unit_length(points - self._words[nearest])
-        # Large keypoints are few, and what they show is the scene rather than its texture.
+        # Large keypoints are few, and show the scene rather than its texture.
         residuals *= np.sqrt(features.keypoints[:, 2:3])
         sums = np.zeros_like(self._words)
         # Sorting by word makes each word's rows one run: far faster than np.add.at.

@@ -1,21 +1,10 @@
 """A photo's SIFT descriptors → global vector, without a network: VLAD.
 
-The descriptors are projected and partly whitened, and each goes to its nearest visual word. What
-remains of it after subtracting the word is brought to length 1, weighted by the square root of its
-keypoint's scale, and summed with the others of that word. Each word's sum is brought to length 1
-again, so that neither a repeated texture nor a crowded word outweighs the rest. Last it is whitened
-by what photos have at that word: what they all have there says nothing about one of them.
-
-Measured on 369 photos of 14 scenes, up to 4000 features each, 256 words of 64 numbers, everything
-learnt on other scenes than those tested: mAP 0.912 with all 479 photos in one index and 0.931 with
-each scene in one of its own, first answer right 0.989; with MobileNetV2 see ``global_descriptor``.
-Without the last step 0.886 and 0.914; twice the words then gave 0.895 and 0.924, and with it 0.919
-and 0.936, for twice the memory. Fewer words: 192 gave 0.908 and 0.926, 128 0.898 and 0.923. Instead
-of whitening, subtracting the mean at each word gave 0.901 and 0.917.
-
-Left out, because it gained nothing: signed square roots of the whitened numbers (0.911 and 0.929,
-0.911 and 0.930 without), residuals at their own length, weights by another power of scale. Vectors
-of half the length, by each word's strongest principal components, lost 0.01.
+Descriptors are projected, partly whitened and assigned to their nearest visual word. Each residual
+is normalised, weighted by the square root of its keypoint's scale, and summed per word. Each word's
+sum is normalised again, so that neither a repeated texture nor a crowded word outweighs the rest,
+and finally whitened: what all photos have in common at a word says nothing about one of them
+(TUNING: vlad-words, vlad-whitening).
 
 Sources: Jegou et al., "Aggregating local image descriptors into compact codes", PAMI 2012;
 Arandjelovic and Zisserman, "All about VLAD", CVPR 2013 (each word's sum at length 1); Delhumeau
@@ -34,7 +23,7 @@ from sfm_front.types import Features, Float32Array
 
 
 class Vlad:
-    """Describes photos by their SIFT features. Safe to share between threads."""
+    """Describes photos by their SIFT features. Thread-safe."""
 
     name = "vlad"
 

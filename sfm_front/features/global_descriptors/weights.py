@@ -1,4 +1,4 @@
-"""A weights file, checked against the network it is meant for."""
+"""Load a weights file, checked against the network it is meant for."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sfm_front.errors import WeightsError
 from sfm_front.features.global_descriptors.networks import DescriptorNetwork
 
 NAMED_LAYERS = 3
-"""How many layers an error message names before it only counts."""
+"""Number of layers that an error message names; further ones are only counted."""
 
 
 def load_weights(
@@ -23,7 +23,7 @@ def load_weights(
 
     The file is a state_dict in torchvision's naming, bare or as ``{"state_dict": …}``, with or
     without DataParallel's ``module.`` prefix, and with or without the classifier, which is not
-    used. Its pickled code is never run. ``network`` may have been built on torch's meta device;
+    used. Pickled code is never run. ``network`` may have been built on torch's meta device;
     what the file lacks of the classifier is left there. ``expected`` names the official file, for
     the message.
 
@@ -47,7 +47,7 @@ def read_state_dict(file: Path, *, expected: str) -> dict[str, Tensor]:
     """The tensors in ``file`` by name, on the CPU, unwrapped from what training scripts add.
 
     Raises:
-        WeightsError: no such file, damaged, or something else than tensors by name.
+        WeightsError: no such file, damaged, or anything but tensors by name.
     """
     if not file.is_file():
         raise WeightsError(f"{file}: no such file. Expected torchvision's {expected}.")
@@ -72,7 +72,7 @@ def _is_state_dict(content: object) -> bool:
 
 
 def _mismatch(state: Mapping[str, Tensor], network: DescriptorNetwork) -> str:
-    """What speaks against ``state`` being weights of ``network``; empty if nothing does."""
+    """Why ``state`` cannot be weights of ``network``; empty if it can."""
     known = network.state_dict()
     needed = {
         name: tensor.shape

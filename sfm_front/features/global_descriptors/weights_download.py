@@ -1,4 +1,4 @@
-"""Fetch an official weights file once, into the folder where torch.hub keeps such files."""
+"""Download an official weights file once, into torch.hub's cache folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STALL_TIMEOUT_S = 20.0
 CHUNK_BYTES = 1 << 20
 
 Progress = Callable[[int, int], None]
-"""Called with the bytes received and the bytes expected (0 where the server does not say)."""
+"""Called with the bytes received and the bytes expected (0 if the server does not say)."""
 
 _log = logging.getLogger(__name__)
 
@@ -35,13 +35,13 @@ def checkpoint_folder() -> Path:
 
 
 def cached_or_fetched(url: str, *, progress: Progress | None = None) -> Path:
-    """The file at ``url``, from the cache if it is there whole, else downloaded into it.
+    """The file at ``url``, from the cache if complete there, else downloaded into it.
 
     The file name ends in the first digits of the file's SHA-256, as in ``resnet101-63fe2227.pth``,
     and a file that does not match them is never used. Nothing partial is ever seen under that name.
 
     Raises:
-        WeightsError: it is not in the cache and cannot be had. An unreachable network costs
+        WeightsError: it is not cached and cannot be downloaded. An unreachable network costs
             ``CONNECT_TIMEOUT_S`` at most.
     """
     path = checkpoint_folder() / file_name(url)
@@ -83,7 +83,7 @@ def _is_whole(path: Path, url: str) -> bool:
 
 
 def _download(url: str, path: Path, progress: Progress | None) -> None:
-    """Write ``url`` to ``path``: to a temporary file beside it, checked, then renamed."""
+    """Download ``url`` to a temporary file, check it, and rename it to ``path``."""
     response, expected = _open(url)
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f"{path.name}.", suffix=".part", dir=path.parent)
@@ -108,7 +108,7 @@ def _download(url: str, path: Path, progress: Progress | None) -> None:
 def _open(url: str) -> tuple[IO[bytes], int]:
     """The response and its length, or an error within ``CONNECT_TIMEOUT_S``.
 
-    In a thread of its own, because a socket's timeout covers neither the name look-up nor the
+    In its own thread, because a socket's timeout covers neither the name look-up nor the
     second address that is tried after the first.
     """
     outcome: queue.SimpleQueue[tuple[IO[bytes], int] | Exception] = queue.SimpleQueue()
