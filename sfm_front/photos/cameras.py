@@ -1,4 +1,4 @@
-"""Photos -> the COLMAP cameras that they share, with a focal length to start from."""
+"""Photos -> the COLMAP cameras that they share, with an initial focal length."""
 
 from __future__ import annotations
 
@@ -19,36 +19,32 @@ CameraMode = Literal["auto", "single", "per-folder", "per-image"]
 AnyPhoto: TypeAlias = "Photo | ExtractedPhoto"
 
 DEFAULT_FOCAL_FACTOR = 1.2
-"""Focal length over the long side where nothing is known, as in COLMAP."""
+"""Focal length over the long side if nothing is known, as in COLMAP."""
 
 PLAUSIBLE_FOCAL_FACTORS = (0.1, 10.0)
-"""An EXIF focal length outside this many long sides is taken for a mistake."""
+"""An EXIF focal length outside this range, in long sides, counts as wrong."""
 
 PHOTOS_PER_SIZE = 10
-"""Photos without EXIF share cameras while their folder has at most one size, and one more for
-this many photos. Folders of film frames, of a phone or of a benchmark have one size. Photos from
-the internet have nearly as many sizes as photos (the 74 of the Image Matching Challenge's
-Reichstag have 68): where two agree, it is by chance."""
+"""Photos without EXIF share cameras while their folder has at most one size, plus one per this many
+photos. Film frames, phones and benchmarks have one size per folder; photos from the internet have
+nearly as many sizes as photos, and equal ones by chance (TUNING: photos-per-size)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraOptions:
-    """How photos are given cameras.
+    """How cameras are assigned to photos."""
 
-    ``mode``: which photos share one camera.
-      ``auto``: those of the same make, model, focal length and size; those without EXIF by folder
-      and size (see ``PHOTOS_PER_SIZE``).
-      ``single``: all. ``per-folder``: those of a folder. ``per-image``: none.
-      Whatever the mode, photos of different size have different cameras: COLMAP would refuse them
-      in the modes ``single`` and ``per-folder``; here no photo is lost. A photo turned on its side
-      is one of different size.
-    ``model``: a COLMAP camera model.
-    ``params``: known calibration, in COLMAP's order and in pixels of the file. It holds for the
-    first photo and those of its size; other photos have their own focal length to start from.
-    """
-
+    # Which photos share one camera.
+    #   auto: those of the same make, model, focal length and size; those without EXIF by folder
+    #   and size (see PHOTOS_PER_SIZE).
+    #   single: all. per-folder: those of a folder. per-image: none.
+    # In every mode photos of different size have different cameras: COLMAP would reject them in the
+    # modes single and per-folder; here no photo is lost. Portrait and landscape differ in size.
     mode: CameraMode = "auto"
+    # A COLMAP camera model.
     model: str = "SIMPLE_RADIAL"
+    # Known calibration, in COLMAP's order and in pixels of the file. It applies to the first photo
+    # and those of its size; other photos start from their own focal length.
     params: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -78,7 +74,7 @@ class CameraOptions:
 
 
 class CameraChoice(NamedTuple):
-    """The camera of a photo; ``is_new`` if no earlier photo has it."""
+    """The camera of a photo; ``is_new`` if no earlier photo uses it."""
 
     camera_id: int
     camera: pycolmap.Camera
@@ -87,16 +83,16 @@ class CameraChoice(NamedTuple):
 
 @dataclass(slots=True)
 class _Folder:
-    """Photos without EXIF in one folder: how many so far, and their sizes, turned or not."""
+    """Photos without EXIF in one folder: number so far, and sizes irrespective of orientation."""
 
     num_photos: int = 0
     sizes: set[tuple[int, int]] = field(default_factory=set)
 
 
 class CameraCatalog:
-    """Hands out cameras to photos that arrive one at a time.
+    """Assigns cameras to photos that arrive one at a time.
 
-    What an earlier photo was given is never changed: mapping already uses it. A resumed session
+    An earlier assignment is never changed: mapping already uses it. A resumed session
     calls ``remember`` for its photos in their order, and goes on as if it had never stopped.
     """
 
@@ -110,7 +106,7 @@ class CameraCatalog:
     def camera_for(self, photo: AnyPhoto) -> CameraChoice:
         """The camera of a photo that has just arrived. The object is shared with earlier photos.
 
-        Raises ConfigError if a given calibration cannot be that of the first photo.
+        Raises ConfigError if the given calibration does not fit the first photo.
         """
         key = self._arrive(photo)
         known = self._cameras.get(key)
@@ -121,7 +117,7 @@ class CameraCatalog:
         return CameraChoice(camera.camera_id, camera, is_new=True)
 
     def remember(self, photo: AnyPhoto, camera: pycolmap.Camera) -> None:
-        """Restore what an earlier session chose for a photo; photos come in their order."""
+        """Restore an earlier session's choice for a photo; call in order of arrival."""
         self._keep(self._arrive(photo), camera)
 
     def _keep(self, key: Hashable, camera: pycolmap.Camera) -> None:
@@ -173,7 +169,7 @@ class CameraCatalog:
 
 
 def focal_prior_px(photo: AnyPhoto) -> float | None:
-    """The focal length in pixels that EXIF gives, or None where it gives none or an absurd one.
+    """The focal length in pixels that EXIF gives, or None if absent or implausible.
 
     From the 35 mm equivalent as in COLMAP (by diagonals); else from the focal length and the
     sensor width of make and model in COLMAP's camera database, for which pycolmap reads the file.

@@ -1,4 +1,4 @@
-"""A folder -> the photos in it, in the order in which they are to arrive."""
+"""A folder -> the photos in it, in order of arrival."""
 
 from __future__ import annotations
 
@@ -24,10 +24,9 @@ def list_photos(folder: Path, *, exclude: Path | None = None) -> list[PhotoPath]
     """Every photo below ``folder``, sub-folders and links to folders included, sorted by name as
     text (``img10`` before ``img2``), as COLMAP sorts them.
 
-    A file is taken for a photo by its extension alone, so that one whose content is no image can
-    be reported; other files, and hidden files and folders, are passed over. Nothing below
-    ``exclude`` is listed: an output folder may lie among the photos. Raises InputError where there
-    is no such folder or no photo in it.
+    Photos are recognised by extension alone, so that a file that is no image can be reported; other
+    files, and hidden files and folders, are ignored. Nothing below ``exclude`` is listed: an output
+    folder may lie among the photos. Raises InputError if there is no such folder or no photo in it.
     """
     if not folder.exists():
         raise InputError(f"{folder}: no such folder. Give the folder that holds the photos.")
@@ -45,8 +44,8 @@ def list_photos(folder: Path, *, exclude: Path | None = None) -> list[PhotoPath]
 def order_photos(
     photos: Iterable[PhotoPath], order: PhotoOrder = "name", *, seed: int = 0
 ) -> list[PhotoPath]:
-    """Photos by ``name``; by ``time`` of capture, then name, those without a time last; or in a
-    ``random`` order that ``seed`` alone decides."""
+    """Photos by ``name``; by ``time`` of capture, then name, those without a time last; or in
+    ``random`` order, determined by ``seed`` alone."""
     if order not in get_args(PhotoOrder):
         raise ConfigError(f"order must be one of {', '.join(get_args(PhotoOrder))}, got {order}")
     by_name = sorted(photos, key=lambda photo: photo.name)
@@ -62,7 +61,7 @@ def _capture_time(photo: PhotoPath) -> datetime:
 
 
 def _walk(folder: Path, exclude: Path | None) -> Iterator[Path]:
-    """Paths of the photos below ``folder``; each folder once, even where links make a loop."""
+    """Paths of the photos below ``folder``; each folder once, even if links form a loop."""
     seen = {_identity(folder)}
     if exclude is not None and exclude.exists():
         seen.add(_identity(exclude))

@@ -1,8 +1,8 @@
 """Coarse retrieval: a growing cosine index over global vectors.
 
-A query runs over short codes of all photos, then over the vectors of the nearest of them. A code
-holds the signs of the randomly rotated vector: the share of bits in which two codes differ grows
-with the angle between their vectors. The vectors are kept at 8 bits a number.
+A query compares the short codes of all photos, then the vectors of the nearest. A code holds the
+signs of the randomly rotated vector: the share of bits in which two codes differ grows with the
+angle between their vectors. Vectors are stored at 8 bits per number.
 
 Sources: Charikar, "Similarity estimation techniques from rounding algorithms", STOC 2002 (codes);
 Chum et al., "Total recall: automatic query expansion with a generative feature model for object
@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from sfm_front.types import Candidate, Float32Array, Uint8Array
 
 SHORTLIST = 192
-"""Photos whose vectors are looked at; four times those asked for where that is more."""
+"""Photos whose vectors are compared; four times those requested if that is more. More cost time and
+hardly find more (TUNING: shortlist)."""
 
-# Photos that a widened query orders anew. All of the shortlist take longer and give the same: of
-# 5063, 0.9334 of the relevant photos were among the first 25, and 0.9338 with 256.
+# Photos re-ordered by an expanded query. The whole shortlist takes longer and gives the same
+# (TUNING: expansion-depth).
 _EXPANDED = 100
 
-# A vector is rotated as a matrix of this many columns, and this many rows come out.
+# A vector is rotated as a matrix with this many columns; the result has this many rows.
 _COLUMNS = 128
 _CODE_ROWS = 128
 
@@ -34,21 +35,19 @@ _CODE_ROWS = 128
 class CosineIndex:
     """Unit vectors of photos, compared by cosine. Adding is amortised constant time.
 
-    Up to ``SHORTLIST`` photos all are compared. With 5063, most of them made up of parts of real
-    ones, 95.9 % of the true 25 nearest by VLAD were found, 99.2 % of the relevant among them.
-    Cosines are good to 0.001.
-    A photo takes a byte a number and 2 kB: 18 kB with VLAD of 16 384 numbers.
+    Exhaustive up to ``SHORTLIST`` photos, approximate beyond. Cosines are accurate to 0.001.
+    A photo takes one byte per number plus 2 kB: 18 kB with VLAD of 16 384 numbers.
     """
 
     def __init__(self, dimension: int) -> None:
-        # An empty folder's vectors are of no dimension; faiss knows no such index.
+        # An empty folder's vectors have dimension 0, which faiss does not accept.
         dimension = max(1, dimension)
         self._encoder = _SignEncoder(dimension)
         self._codes = faiss.IndexBinaryFlat(_CODE_ROWS * _COLUMNS)
         self._vectors = faiss.IndexScalarQuantizer(
             dimension, faiss.ScalarQuantizer.QT_8bit_uniform, faiss.METRIC_INNER_PRODUCT
         )
-        # Sets the range of numbers; each vector is stretched to it.
+        # Sets the value range; each vector is scaled to it.
         self._vectors.train(np.outer([-1, 1], np.ones(dimension)).astype(np.float32))
         self._peaks: list[float] = []
         self._image_ids: list[int] = []
@@ -58,7 +57,7 @@ class CosineIndex:
         return len(self._image_ids)
 
     def add(self, image_id: int, vector: Float32Array) -> None:
-        """Remember a photo by its (dimension,) vector of length 1."""
+        """Add a photo with its (dimension,) vector of length 1."""
         peak = float(np.abs(vector).max()) or 1.0
         self._codes.add(self._encoder.encode(vector)[np.newaxis])
         self._vectors.add(vector[np.newaxis] / np.float32(peak))
@@ -75,11 +74,11 @@ class CosineIndex:
         expand_with: Iterable[int] = (),
     ) -> list[Candidate]:
         """The ``count`` photos nearest to the (dimension,) vector with their cosines, best first;
-        of equals the one added earlier.
+        ties by order of arrival.
 
-        ``num_expansion``: so many of the best, each times its cosine, are added to the vector, and
-        ``expand_with``: so are these photos. The best 100 or, if that is more, twice as many as are
-        asked for are ordered by what that gives; their cosines remain those with the vector.
+        ``num_expansion``: number of top results that are added to the vector, each weighted by its
+        cosine; ``expand_with``: photos added likewise. The expanded vector orders the best 100,
+        or ``2 * count`` if that is more; reported cosines remain those with the original vector.
         """
         rows = self._shortlist(vector, max(SHORTLIST, 4 * count))
         cosines = scores = self._cosines(vector, rows)
@@ -96,7 +95,7 @@ class CosineIndex:
         ]
 
     def _shortlist(self, vector: Float32Array, count: int) -> NDArray[np.int64]:
-        """The places of the photos with the nearest codes, in the order they came."""
+        """Rows of the photos with the nearest codes, in order of arrival."""
         if count >= len(self):
             return np.arange(len(self))
         _, rows = self._codes.search(self._encoder.encode(vector)[np.newaxis], count)
@@ -122,14 +121,14 @@ class CosineIndex:
 
 
 def _best(cosines: Float32Array, count: int) -> NDArray[np.intp]:
-    """The places of the ``count`` highest; of equals the first."""
+    """Indices of the ``count`` highest; ties by index."""
     return np.argsort(-cosines, kind="stable")[:count]
 
 
 class _SignEncoder:
     """Vector → the signs of its random rotation.
 
-    It is rotated as a matrix, from the left and from the right: a whole rotation of 16 384 numbers
+    It is rotated as a matrix, from the left and from the right: a full rotation of 16 384 numbers
     would take 1 GB and as long as comparing with thousands of photos.
     """
 
@@ -137,7 +136,7 @@ class _SignEncoder:
         generator = np.random.default_rng(0)
         num_rows = -(-dimension // _COLUMNS)
         self._padding = num_rows * _COLUMNS - dimension
-        # Without them a matrix of positive numbers would be of about rank 1, its signs alike.
+        # Without flips a matrix of positive numbers has about rank 1, and its signs are alike.
         self._flips = generator.choice([-1, 1], dimension).astype(np.float32)
         self._left = _rotation(generator, max(num_rows, _CODE_ROWS))[:_CODE_ROWS, :num_rows]
         self._right = _rotation(generator, _COLUMNS)

@@ -1,8 +1,8 @@
-"""The coarse step of hierarchical retrieval, and the order of all photos once it was re-ranked.
+"""The coarse step of hierarchical retrieval, and the ranking of all photos after re-ranking.
 
 Source: Zhan, Zhou and Yang, "A Method of Hierarchical Image Retrieval for Real-Time Photogrammetry
-Based on Multiple Features", IEEE Access 2020, doi 10.1109/ACCESS.2020.2969287. Widening a query
-with verified answers: Chum et al., "Total recall: automatic query expansion with a generative
+Based on Multiple Features", IEEE Access 2020, doi 10.1109/ACCESS.2020.2969287. Query expansion
+with verified results: Chum et al., "Total recall: automatic query expansion with a generative
 feature model for object retrieval", ICCV 2007.
 """
 
@@ -18,10 +18,11 @@ from sfm_front.types import Candidate, Float32Array
 
 @dataclass(frozen=True, kw_only=True)
 class RetrievalOptions:
-    """``candidates``: photos that the global vectors propose. ``num_expansion``: number of top
-    results used for query expansion, see ``CosineIndex.query``."""
+    """How many photos the coarse step looks at."""
 
+    # Number of photos proposed by the global vectors.
     candidates: int = 25
+    # Number of top results used for query expansion (TUNING: query-expansion).
     num_expansion: int = 5
 
     def __post_init__(self) -> None:
@@ -32,7 +33,7 @@ class RetrievalOptions:
 
 
 class Retriever:
-    """Remembers photos by their global vectors, and ranks them for another one."""
+    """Stores photos by their global vectors, and ranks them for a query."""
 
     def __init__(self, options: RetrievalOptions, dimension: int) -> None:
         self._options = options
@@ -42,21 +43,21 @@ class Retriever:
         return len(self._index)
 
     def remember(self, image_id: int, vector: Float32Array) -> None:
-        """Let later photos find this one by its (dimension,) vector of length 1."""
+        """Add a photo with its (dimension,) vector of length 1."""
         self._index.add(image_id, vector)
 
     def candidates(self, vector: Float32Array) -> list[Candidate]:
-        """The coarse step: photos by a (dimension,) global vector and its best, best first."""
+        """The coarse step: photos nearest to a (dimension,) global vector, expanded, best first."""
         options = self._options
         return self._index.query(vector, options.candidates, num_expansion=options.num_expansion)
 
     def rank(
         self, vector: Float32Array, reranked: Sequence[Candidate], *, min_inliers: int
     ) -> list[Candidate]:
-        """All photos: candidates with so many inliers, as re-ranked, then the others.
+        """All photos: candidates with at least ``min_inliers``, as re-ranked, then the others.
 
-        The others are ordered by the vector widened with the verified ones, which show the same
-        for certain; without any, with its best, as in the coarse step.
+        The others are ordered by the query expanded with the verified ones, which certainly
+        overlap; without any, with its top results, as in the coarse step.
         """
         verified = [c for c in reranked if (c.inliers or 0) >= min_inliers]
         first = {candidate.image_id for candidate in verified}
