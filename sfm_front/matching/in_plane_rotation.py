@@ -1,4 +1,4 @@
-"""In-plane rotation between two photos, and which of their features it lets match."""
+"""In-plane rotation between two photos, and which of their features may match under it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from sfm_front.geometry.angles import FULL_TURN, wrapped
 from sfm_front.matching.match_mask import MaskBlock, MatchMask
 from sfm_front.types import Float32Array
 
-# Of the verified matches of nine scenes, 87 to 99 % are turned within this of the pair's common
-# turn; 74 % in opensfm_lund, where facades stand aslant, and many pairs have no common turn.
+# Most verified matches agree within this with the pair's rotation (TUNING: rotation-tolerance).
 TOLERANCE_RAD = np.deg2rad(20)
 _MATCH_TOLERANCE_RAD = np.deg2rad(30)
 _MIN_MATCHES = 16
@@ -22,14 +21,14 @@ NUM_SECTORS = 24
 
 
 def in_plane_rotation(keypoints1: Float32Array, keypoints2: Float32Array) -> float | None:
-    """The angle, in radians, by which matching keypoints (M, 4) turn from photo 1 to photo 2.
+    """In-plane rotation in radians from photo 1 to photo 2, by matching keypoints (M, 4).
 
-    None where the matches are too few to tell, or do not agree.
+    None if there are too few matches or they disagree.
     """
     if len(keypoints1) < _MIN_MATCHES:
         return None
     turns = np.exp(1j * (keypoints2[:, 3] - keypoints1[:, 3]))
-    # Medians, not means: what does not agree must not pull.
+    # Medians, not means: robust to outliers.
     common = float(np.angle(complex(np.median(turns.real), np.median(turns.imag))))
     agreeing = _apart_rad(keypoints1, keypoints2, common) < TOLERANCE_RAD
     return common if agreeing.mean() >= _MIN_AGREEING else None
@@ -38,7 +37,7 @@ def in_plane_rotation(keypoints1: Float32Array, keypoints2: Float32Array) -> flo
 def agrees_with_rotation(
     keypoints1: Float32Array, keypoints2: Float32Array, rotation_rad: float
 ) -> NDArray[np.bool_]:
-    """(M,) whether matching keypoints (M, 4) turn by so much, 30 degrees more or less."""
+    """(M,) whether matching keypoints (M, 4) rotate by this much, within 30 degrees."""
     alike: NDArray[np.bool_] = (
         _apart_rad(keypoints1, keypoints2, rotation_rad) < _MATCH_TOLERANCE_RAD
     )
@@ -48,7 +47,7 @@ def agrees_with_rotation(
 def _apart_rad(
     keypoints1: Float32Array, keypoints2: Float32Array, rotation_rad: float
 ) -> NDArray[np.floating[Any]]:
-    """(M,) how far matching keypoints (M, 4) are from turning by so much."""
+    """(M,) deviation of matching keypoints (M, 4) from this rotation."""
     apart: NDArray[np.floating[Any]] = np.abs(
         wrapped(keypoints2[:, 3] - keypoints1[:, 3] - rotation_rad)
     )
@@ -58,10 +57,10 @@ def _apart_rad(
 def rotation_mask(
     orientations1: Float32Array, orientations2: Float32Array, rotation_rad: float
 ) -> MatchMask:
-    """Features (N,) and (M,) that may match where photo 2 is turned by this against photo 1.
+    """Features (N,) and (M,) that may match if photo 2 is rotated by this against photo 1.
 
-    Each feature of photo 1 meets those of photo 2 within 20 degrees of where the turn takes it,
-    and some up to 35 degrees away. A sixth of all pairs meets where orientations are spread.
+    Each feature of photo 1 is compared to those of photo 2 within 20 degrees of its rotated
+    orientation, and to some up to 35 degrees away: a sixth of all pairs if orientations are spread.
     """
     expected = np.mod(orientations1 + rotation_rad, FULL_TURN)
     found = np.mod(orientations2, FULL_TURN)
