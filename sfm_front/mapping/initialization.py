@@ -1,4 +1,4 @@
-"""Which pair to start a model from, and what to ask of it."""
+"""Which pair to start a model from, and what it must satisfy."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class ConstraintLevel:
 
 @dataclass(frozen=True, kw_only=True)
 class InitializationOptions:
-    """``constraint_levels``: from COLMAP's own constraints downwards; nadir flights need a smaller
-    angle, and driving along a street 1° and forward motion. ``max_trials``: pairs estimated each
-    time a photo arrives; ``max_last_trials``: when no more will."""
+    """How hard a start is sought, and how far its constraints are relaxed."""
 
+    # COLMAP's own constraints first, then relaxed: nadir flights need a smaller angle, driving
+    # along a street 1° and forward motion.
     constraint_levels: tuple[ConstraintLevel, ...] = (
         ConstraintLevel(
             min_waiting=2, constraints=InitialPairConstraints(min_angle_deg=16, min_inliers=100)
@@ -59,12 +59,14 @@ class InitializationOptions:
             ),
         ),
     )
+    # Pairs estimated per arriving photo.
     max_trials: int = 4
+    # Pairs estimated once no more photos will come.
     max_last_trials: int = 60
 
 
 class Initializer:
-    """Starts models. A pair is tried once at each relaxation."""
+    """Starts models. A pair is tried once per constraint level."""
 
     def __init__(
         self,

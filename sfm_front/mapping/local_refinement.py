@@ -1,4 +1,4 @@
-"""Bundle adjustment around the newest photos of a model."""
+"""Local bundle adjustment around the newest photos of a model."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ import pycolmap
 
 from sfm_front.mapping.refinement_schedule import local_refinement_batch
 
-# A point in more photos than this is left as it is: it hardly moves, and brings all of them in.
+# Points in more photos than this stay fixed: they hardly move, and would pull all photos in.
 _MAX_TRACK_LENGTH = 15
 
 
 class LocalRefinement:
-    """COLMAP's local refinement, for one photo at a time or, in a large model, for several.
+    """COLMAP's local refinement, per photo or, in a large model, per batch of photos.
 
-    Whatever it adjusts, COLMAP checks the whole model for consistency first: 5 ms at 12 000 points
-    and 24 ms at 35 000. Photos that share the adjustment share that, so that a photo costs the same
-    in a large model.
+    COLMAP first checks the whole model for consistency, in time proportional to its size. A batch
+    shares that check, so that the cost per photo stays constant (TUNING: local-batch).
     """
 
     def __init__(self, options: pycolmap.IncrementalPipelineOptions) -> None:
@@ -25,7 +24,7 @@ class LocalRefinement:
         self._waiting: list[int] = []
 
     def add(self, mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
-        """Refine around a photo that was just registered and triangulated, at once or later."""
+        """Refine around a newly registered and triangulated photo, now or with its batch."""
         self._waiting.append(image_id)
         if len(self._waiting) >= local_refinement_batch(mapper.reconstruction.num_reg_images()):
             self._refine(mapper)
@@ -54,7 +53,7 @@ class LocalRefinement:
     def _adjust(
         self, mapper: pycolmap.IncrementalMapper, bundle: set[int], points: set[int]
     ) -> None:
-        """Cameras stay as they are where photos outside the bundle have them too."""
+        """Cameras stay fixed if photos outside the bundle share them."""
         model = mapper.reconstruction
         config = pycolmap.BundleAdjustmentConfig()
         config.fix_gauge(pycolmap.BundleAdjustmentGauge.THREE_POINTS)

@@ -1,4 +1,4 @@
-"""Where a photo stands in a model, by the points that its first verified pairs lead to."""
+"""Pose of a photo in a model, by 2D-3D matches from its first verified pairs."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from sfm_front.types import Float32Array, Float64Array, PairGeometry, Uint32Arra
 
 @dataclass(frozen=True, kw_only=True)
 class LocalizationOptions:
-    """``max_error_px``: reprojection error of an inlier, in pixels of the file. ``min_inliers``
-    and ``min_share`` of the points: that a pose must fit. ``sample``: points of each pair that are
-    looked at. ``seed``: of the sample and of RANSAC."""
+    """When a pose is accepted."""
 
+    # Reprojection error of an inlier, in pixels of the file.
     max_error_px: float = 8.0
+    # Number and share of the points that a pose must fit.
     min_inliers: int = 30
     min_share: float = 0.5
+    # Points used per pair.
     sample: int = 100
+    # Of the sample and of RANSAC.
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -37,7 +39,7 @@ class LocalizationOptions:
 
 
 def registered_photo(reconstruction: pycolmap.Reconstruction, image_id: int) -> PosedCamera | None:
-    """Camera and pose of a photo of a model; None where it is not in it."""
+    """Camera and pose of a photo in a model; None if it is not registered."""
     image = _registered_image(reconstruction, image_id)
     if image is None:
         return None
@@ -62,7 +64,7 @@ def locate(
 ) -> PosedCamera | None:
     """Pose of a photo with keypoints (N, 4) by its pairs with photos of a model.
 
-    The camera is the model's. None where the model has none, or too few points fit a pose.
+    The camera is the model's. None if the model lacks it, or too few points fit a pose.
     """
     if not reconstruction.exists_camera(camera_id):
         return None
@@ -87,7 +89,7 @@ def _seen(
     pairs: Iterable[PairGeometry],
     options: LocalizationOptions,
 ) -> tuple[Float64Array, Float64Array]:
-    """(K, 2) pixels of keypoints and (K, 3) points of the model that matches lead them to."""
+    """(K, 2) pixels of keypoints and (K, 3) matched model points in world coordinates."""
     point_of: dict[int, Float64Array] = {}
     for pair in pairs:
         image = _registered_image(reconstruction, pair.image_id2)
@@ -102,7 +104,7 @@ def _seen(
 def _triangulated(
     pair: PairGeometry, image: pycolmap.Image, options: LocalizationOptions
 ) -> Uint32Array:
-    """(K, 2) of the pair's inliers, a sample of those whose second keypoint shows a point."""
+    """(K, 2) of the pair's inliers, a sample of those whose second keypoint has a 3-D point."""
     matches = pair.two_view_geometry.inlier_matches
     matches = matches[np.isin(matches[:, 1], image.get_observation_point2D_idxs())]
     if len(matches) <= options.sample:

@@ -1,4 +1,4 @@
-"""When to refine a whole model, and when the local refinement of the newest photo will do."""
+"""When to refine a whole model, and when local refinement suffices."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
 
-# Photos from which a model is refined seldom, and its last adjustments go on for long. A long
-# flight unbends slowly; on small models patience only takes longer.
+# Photos from which a model is refined globally less often, and its last adjustments converge
+# longer: long flights unbend slowly, small models gain nothing (TUNING: large-growth).
 LARGE = 100
+# Keeps the cost per photo constant (TUNING: local-batch).
 _PHOTOS_PER_BATCH = 250
 
 
 def local_refinement_batch(num_images: int) -> int:
-    """How many new photos of a model of this size share a local refinement."""
+    """Number of new photos that share a local refinement in a model of this size."""
     return 1 + num_images // _PHOTOS_PER_BATCH
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScheduleOptions:
-    """A model is refined as a whole each time its photos or points have grown by ``growth``; one
-    of ``large_from`` photos or more by ``large_growth``.
+    """A model is refined globally each time its photos or points have grown by a factor.
 
     Geometric growth keeps the cost of global refinement, summed over a session, proportional to
     that of the last one. That cost grows faster than the model, and a large model is not bent by
@@ -28,6 +28,7 @@ class ScheduleOptions:
     """
 
     growth: float = 1.25
+    # The factor from ``large_from`` photos on.
     large_growth: float = 1.6
     large_from: int = LARGE
 

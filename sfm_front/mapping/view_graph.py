@@ -1,4 +1,4 @@
-"""Everything seen so far, in the form pycolmap's mapper reads: the only streaming calls."""
+"""Photos and verified pairs so far, as pycolmap's mapper reads them: the only streaming calls."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from sfm_front.types import Float32Array, PairGeometry
 
 
 class ViewGraph:
-    """The photos and verified pairs that every model is grown over.
+    """The photos and verified pairs that all models grow over.
 
-    A photo's image, frame and (for its camera) rig ids are equal to the image and camera ids it
-    is added with. The correspondence graph is never finalised: pycolmap cannot append to a
+    A photo's image, frame and (for its camera) rig ids equal the image and camera ids it is
+    added with. The correspondence graph is never finalised: pycolmap cannot append to a
     finalised one, and answers queries on an open one.
     """
 
@@ -81,7 +81,7 @@ class ViewGraph:
     def angle_deg(self, pair: tuple[int, int]) -> float | None:
         """Median triangulation angle of a verified pair, by its own two-view geometry.
 
-        None where that geometry has no relative pose, as without a focal length.
+        None if that geometry has no relative pose, as without a focal length.
         """
         angle_rad = self._angles_rad[pair]
         return math.degrees(angle_rad) if angle_rad >= 0 else None
@@ -114,7 +114,7 @@ class ViewGraph:
         reconstruction: pycolmap.Reconstruction,
         image_id: int,
     ) -> None:
-        """Let a model know of a photo that was added after its mapper was made.
+        """Make a photo that was added after its mapper was made known to a model.
 
         ``Reconstruction.load`` would do the same, but walks all photos each time.
         """
