@@ -16,21 +16,20 @@ from sfm_front.types import PairGeometry, View
 
 @dataclass(frozen=True, kw_only=True)
 class AtlasOptions:
-    """When models are started and kept.
+    """When models are started and kept."""
 
-    ``min_second_model``: photos that must wait, linked to each other, before a further model is
-    started. ``min_model_size``: photos of its own that a further model must have to be kept.
-    ``max_missed_share``: of linked photos that may be in no model without a fresh start.
-    ``min_share``: of the photos linked to a model that it should hold itself.
-    ``fresh_starts``: how many starts of each relaxation the end of a session may try.
-    ``max_failures``: fresh starts that may grow far and be no better before it gives up.
-    """
-
+    # Linked photos that must wait before a further model is started.
     min_second_model: int = 4
+    # Photos in no larger model that a further model must have to be kept.
     min_model_size: int = 3
+    # Share of linked photos that may be in no model without a restart.
     max_missed_share: float = 0.02
+    # Share of the photos linked to a model that it should register itself.
     min_share: float = 0.75
+    # Restarts per constraint level that the end of a session may try.
     fresh_starts: int = 2
+    # Restarts that may register over half as many photos as the best model, but no more than it,
+    # before giving up.
     max_failures: int = 1
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)
@@ -40,10 +39,9 @@ class AtlasOptions:
 class Atlas:
     """All models of a session, largest first.
 
-    A photo may be in several models while they grow: the largest takes the photos of smaller
-    ones as soon as it sees them, and a model that has been taken over whole is dropped. That
-    joins models, and it forgives a bad start: what grows from the photos that did not fit
-    takes over what did.
+    A photo may be in several models while they grow: the largest registers the photos of smaller
+    ones as soon as it sees them, and a model whose photos larger ones hold is dropped. This also
+    recovers from a bad start: a model grown from the photos that did not fit takes over the rest.
     """
 
     def __init__(self, view_graph: ViewGraph, options: AtlasOptions | None = None) -> None:
@@ -136,7 +134,7 @@ class Atlas:
         return grew
 
     def candidates_of(self, model: Model) -> list[int]:
-        """Photos that a model may take: the largest those of smaller models, too."""
+        """Photos that a model may register; for the largest, those of smaller models too."""
         if model is self.models[0]:
             return self.view_graph.image_ids
         return self.waiting

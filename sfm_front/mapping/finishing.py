@@ -50,10 +50,10 @@ class _Finishing:
                 model.forget_failures()
 
     def _restart_largest(self) -> None:
-        """Where the largest model misses photos linked to it, grow it anew.
+        """If the largest model misses photos linked to it, restart it.
 
-        The stream had to take the first pair that would do; the whole graph offers better ones.
-        The better of old and new stays.
+        The stream had to take the first acceptable pair; the whole graph offers better ones. The
+        better of old and new stays.
         """
         failures = 0
         for fresh, event in self._initializer.best_starts(self._options.fresh_starts):
@@ -66,7 +66,7 @@ class _Finishing:
                 self._atlas.models.insert(0, fresh)
                 self._refine_until_stable()
             elif 2 * fresh.num_registered > largest.num_registered:
-                # A start that carried far and still placed no more: another hardly will.
+                # It grew far and still registered no more: another start hardly will.
                 failures += 1
                 if failures == self._options.max_failures:
                     return
@@ -74,9 +74,8 @@ class _Finishing:
     def _fix_intrinsics(self) -> None:
         """Grow models anew whose photos do not tell what their camera is, with what EXIF says.
 
-        A nadir flight over flat ground leaves focal length and distortion open. On
-        ``uav_garfield_rgb`` they have ended at 23 times the EXIF focal length, and the photos 62 m
-        from GPS in the median, on a site of 185 m; with the camera held 13 m.
+        A nadir flight over flat ground does not determine focal length and distortion
+        (TUNING: fixed-intrinsics).
         """
         miscalibrated = [model for model in self._atlas.models if model.is_miscalibrated]
         held = replace(self._options.mapper, refine_intrinsics=False)
@@ -131,7 +130,7 @@ class _Finishing:
         return best
 
     def _register_structure_less(self) -> bool:
-        """Register by two-view geometry alone what sees too few points; True if any was."""
+        """Register photos that see too few points by two-view geometry; True if any was."""
         placed: list[int] = []
         for model in self._atlas.models:
             placed += model.register_structure_less(self._atlas.candidates_of(model))
