@@ -13,7 +13,7 @@ _MAX_TRACK_LENGTH = 15
 class LocalRefinement:
     """COLMAP's local refinement, per photo or, in a large model, per batch of photos.
 
-    COLMAP first checks the whole model for consistency, in time proportional to its size. A batch
+    COLMAP first checks the whole model for consistency, which takes longer as it grows. A batch
     shares that check, so that the cost per photo stays constant (TUNING: local-batch).
     """
 
