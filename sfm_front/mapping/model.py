@@ -9,28 +9,32 @@ from dataclasses import dataclass, field
 import pycolmap
 
 from sfm_front.errors import ConfigError
-from sfm_front.mapping.final_adjustment import FinalAdjustmentOptions, final_adjustment
+from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
+from sfm_front.mapping.calibration import (
+    CalibrationOptions,
+    impossible_photos,
+    is_miscalibrated,
+)
+from sfm_front.mapping.final_adjustment import final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.refinement_schedule import RefinementSchedule, ScheduleOptions
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.runtime.stopwatch import Stopwatch
 
-# Trial counts are kept here, by what a photo sees, not by pycolmap.
+# Trials are limited here, by the points a photo sees, not by pycolmap.
 _UNLIMITED_TRIALS = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class InitialPairConstraints:
-    """What two photos must show to start a model: see COLMAP's ``init_*`` options.
-
-    ``min_points``: a new model with fewer 3-D points is rejected. ``refine_intrinsics``: whether
-    the two photos' own adjustment may move focal length and distortion; few points cannot tell.
-    """
+    """What two photos must satisfy to start a model: see COLMAP's ``init_*`` options."""
 
     min_angle_deg: float
     min_inliers: int
     max_forward_motion: float = 0.95
+    # A new model with fewer 3-D points is rejected.
     min_points: int = 50
+    # Refine focal length and distortion on the pair; few points do not determine them.
     refine_intrinsics: bool = True
 
     def __post_init__(self) -> None:
@@ -45,7 +49,7 @@ class InitialPairConstraints:
         constrained.init_min_tri_angle = self.min_angle_deg
         constrained.init_min_num_inliers = self.min_inliers
         constrained.init_max_forward_motion = self.max_forward_motion
-        # What starts with few points can ask no more of the photos that follow.
+        # A model that starts with few points cannot require more of the photos that follow.
         constrained.abs_pose_min_num_inliers = min(
             options.abs_pose_min_num_inliers, self.min_points
         )
@@ -54,17 +58,17 @@ class InitialPairConstraints:
 
 @dataclass(frozen=True, kw_only=True)
 class MapperOptions:
-    """How a model is grown. What is not named here is COLMAP's default.
+    """How a model is grown. Everything else is COLMAP's default."""
 
-    ``retry_growth``: a photo that failed is tried again once it sees this many times the points.
-    ``num_threads``: of the bundle adjustment. ``seed``: of all RANSAC.
-    """
-
+    # A photo that failed is retried once it sees this many times the points.
     retry_growth: float = 1.2
     refine_intrinsics: bool = True
+    # Of the bundle adjustment.
     num_threads: int = 2
+    # Of all RANSAC.
     seed: int = 0
     schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
 
     def __post_init__(self) -> None:
         if self.retry_growth < 1:
@@ -73,10 +77,10 @@ class MapperOptions:
             raise ConfigError(f"num_threads must be at least 1, got {self.num_threads}")
 
     def final(self, num_photos: int) -> pycolmap.IncrementalPipelineOptions:
-        """As pycolmap takes it, for a model of so many photos that no more will follow.
+        """pycolmap's options for a complete model of ``num_photos``.
 
-        COLMAP's own tolerance is 0, which gave the same model of a synthetic flight of 400 photos
-        as 1e-6. With 1e-5 the flight stayed bent: pose AUC at 1° 0.59 for 0.80.
+        COLMAP's own tolerance is 0. 1e-6 gives the same model; with 1e-5 a long flight stays bent
+        (TUNING: final-tolerance).
         """
         options = pycolmap.IncrementalPipelineOptions()
         options.ba_global_function_tolerance = (
@@ -94,9 +98,8 @@ class MapperOptions:
     def streaming(self) -> pycolmap.IncrementalPipelineOptions:
         """The same with bundle adjustments that stop early.
 
-        While photos arrive, each adjustment starts close to its optimum and another one follows.
-        On ``uav_copr`` this halved the mapper's time and left the final model as it was (38
-        photos, 15 781 points for 15 782, 0.178 px).
+        While photos arrive, each adjustment starts close to its optimum and another one follows
+        (TUNING: streaming-adjustment).
         """
         options = self.final(0)
         options.ba_local_function_tolerance = 1e-4
@@ -143,7 +146,7 @@ class Model:
         return int(self._mapper.observation_manager.num_visible_points3D(image_id))
 
     def extend(self, image_id: int) -> None:
-        """Let the model know of a photo that has just been added to the scene."""
+        """Make a photo just added to the view graph known to the model."""
         self._view_graph.extend(self._mapper, self.reconstruction, image_id)
 
     def initialize(
@@ -175,9 +178,9 @@ class Model:
         return True
 
     def grow(self, photos: Iterable[int]) -> list[int]:
-        """Register every one of these that sees enough of the model; the best placed one first.
+        """Register all of these that see enough of the model, the best one first.
 
-        Those that are in it are passed over. Returns the image ids in order of registration.
+        Registered ones are skipped. Returns the image ids in order of registration.
         """
         placed: list[int] = []
         left = set(photos) - self.registered
@@ -191,9 +194,9 @@ class Model:
         return placed
 
     def register_structure_less(self, photos: Iterable[int]) -> list[int]:
-        """Register photos by their matches to registered ones where no 3-D points are seen.
+        """Register photos that see no 3-D points by their matches to registered photos.
 
-        Those that are in the model are passed over, as in ``grow``.
+        Registered ones are skipped, as in ``grow``.
         """
         placed: list[int] = []
         for image_id in sorted(set(photos) - self.registered):
@@ -220,14 +223,15 @@ class Model:
         self.refine()
         self.reconstruction = final_adjustment(
             self.reconstruction,
-            FinalAdjustmentOptions(
+            RobustAdjustmentOptions(
                 refine_intrinsics=self._options.refine_intrinsics,
                 num_threads=self._options.num_threads,
                 large_from=self._options.schedule.large_from,
             ),
+            self._options.calibration,
         )
         if not self.is_miscalibrated:
-            for image_id in self._impossible():
+            for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
         # What is asked of the mapper from here on must be of the model that is handed out.
         self._mapper.end_reconstruction(False)
@@ -235,25 +239,12 @@ class Model:
 
     @property
     def is_miscalibrated(self) -> bool:
-        """Whether most photos have a camera that cannot be: they do not tell what it is."""
-        return 2 * len(self._impossible()) > self.num_registered
+        """Whether most photos have implausible intrinsics: they do not determine them."""
+        return is_miscalibrated(self.reconstruction, self._mapping)
 
     def forget_failures(self) -> None:
-        """Let every waiting photo be tried again."""
+        """Allow every waiting photo to be retried."""
         self._seen_at_failure.clear()
-
-    def _impossible(self) -> list[int]:
-        """Registered photos whose focal length or distortion has left COLMAP's limits."""
-        limits = self._mapping
-        return [
-            image_id
-            for image_id in self.reconstruction.reg_image_ids()
-            if self.reconstruction.camera(
-                self.reconstruction.image(image_id).camera_id
-            ).has_bogus_params(
-                limits.min_focal_length_ratio, limits.max_focal_length_ratio, limits.max_extra_param
-            )
-        ]
 
     def _best(self, waiting: Iterable[int]) -> int | None:
         """The waiting photo with the best spread of visible points, if one is worth a trial."""

@@ -8,7 +8,8 @@ import numpy as np
 import pycolmap
 import pytest
 
-from sfm_front.mapping.final_adjustment import FinalAdjustmentOptions, final_adjustment
+from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
+from sfm_front.mapping.final_adjustment import final_adjustment
 
 FOCAL_PX, WIDTH, HEIGHT = 1000.0, 1024, 768
 OFF_CENTRE = (WIDTH / 2 + 8.0, HEIGHT / 2 - 10.0)
@@ -52,7 +53,7 @@ def principal_point(model: pycolmap.Reconstruction) -> list[float]:
 
 
 def test_a_cropped_photos_principal_point_is_found():
-    polished = final_adjustment(centred(truth(OFF_CENTRE)), FinalAdjustmentOptions())
+    polished = final_adjustment(centred(truth(OFF_CENTRE)), RobustAdjustmentOptions())
     np.testing.assert_allclose(principal_point(polished), OFF_CENTRE, atol=2.0)
 
 
@@ -69,7 +70,7 @@ def test_a_cropped_photos_principal_point_is_found():
 def test_otherwise_it_stays_in_the_middle(point, photos, prior, refine):
     model = centred(truth(point, photos))
     model.camera(next(iter(model.cameras))).has_prior_focal_length = prior
-    polished = final_adjustment(model, FinalAdjustmentOptions(refine_intrinsics=refine))
+    polished = final_adjustment(model, RobustAdjustmentOptions(refine_intrinsics=refine))
     assert principal_point(polished) == [WIDTH / 2, HEIGHT / 2]
 
 
@@ -80,7 +81,7 @@ def test_points_that_do_not_fit_are_dropped():
         element = model.point3D(point_id).track.elements[0]
         image = model.image(element.image_id)
         image.points2D[element.point2D_idx].xy = [WIDTH - 1.0, HEIGHT - 1.0]
-    polished = final_adjustment(centred(model), FinalAdjustmentOptions())
+    polished = final_adjustment(centred(model), RobustAdjustmentOptions())
     assert len(polished.points3D) > 250
     assert max(point.error for point in polished.points3D.values()) < MAX_ERROR_PX
 
@@ -89,7 +90,7 @@ def test_a_model_without_points_stays_as_it_is():
     model = truth((WIDTH / 2, HEIGHT / 2))
     for point_id in list(model.points3D):
         model.delete_point3D(point_id)
-    polished = final_adjustment(model, FinalAdjustmentOptions())
+    polished = final_adjustment(model, RobustAdjustmentOptions())
     assert principal_point(polished) == [WIDTH / 2, HEIGHT / 2]
     assert polished.num_reg_images() == 10
 
@@ -101,7 +102,7 @@ def test_wrong_matches_weigh_less_than_in_least_squares():
         for index in rng.choice(image.num_points2D(), image.num_points2D() // 20, replace=False):
             image.points2D[index].xy += rng.choice([-6.0, 6.0], 2)
     plain = centred(exact)
-    robust = final_adjustment(copy.deepcopy(plain), FinalAdjustmentOptions())
+    robust = final_adjustment(copy.deepcopy(plain), RobustAdjustmentOptions())
 
     def focal_error_px(model: pycolmap.Reconstruction) -> float:
         return abs(model.camera(next(iter(model.cameras))).mean_focal_length() - FOCAL_PX)
