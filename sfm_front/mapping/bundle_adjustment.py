@@ -11,14 +11,14 @@ from sfm_front.mapping.refinement_schedule import LARGE
 
 @dataclass(frozen=True, kw_only=True)
 class RobustAdjustmentOptions:
-    """``loss_scale_px``: reprojection error from which the Cauchy loss gives way.
-    ``refine_intrinsics``: whether focal length and distortion may move, and the principal
-    point of a camera nothing is known of. ``large_from``: registered photos from which the
-    adjustment goes on for long, as in ``ScheduleOptions``."""
+    """How a whole model is adjusted at the end."""
 
+    # Reprojection error from which the Cauchy loss gives way (TUNING: robust-loss).
     loss_scale_px: float = 1.0
+    # Whether focal length and distortion may move, and the principal point of an unknown camera.
     refine_intrinsics: bool = True
     num_threads: int = 2
+    # Registered photos from which the adjustment runs longer, as in ``ScheduleOptions``.
     large_from: int = LARGE
 
 
@@ -36,7 +36,7 @@ def adjust_robustly(
     adjustment.refine_principal_point = principal_point
     adjustment.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     adjustment.ceres.loss_function_scale = options.loss_scale_px
-    # 400 synthetic photos ended at a pose AUC of 0.80 at 1° with 1e-4, at 0.94 with 1e-6.
+    # Long flights stay bent with the looser tolerance (TUNING: robust-tolerance).
     large = reconstruction.num_reg_images() >= options.large_from
     adjustment.ceres.solver_options.function_tolerance = 1e-6 if large else 1e-4
     adjustment.ceres.solver_options.num_threads = options.num_threads

@@ -19,7 +19,7 @@ class CalibrationOptions:
 
     # Photos that must share the camera.
     min_photos: int = 8
-    # Share of the median reprojection error that must go.
+    # Share of the median reprojection error that must go (TUNING: principal-point-gain).
     min_gain: float = 0.035
     # Of the long side; a model that wants its principal point farther out is not determined.
     max_shift: float = 0.025

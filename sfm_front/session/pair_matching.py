@@ -33,7 +33,8 @@ class PairMatchingOptions:
     num_matched: int = 8
     # Number of top candidates matched without guidance; the pose they yield guides the rest.
     num_matched_first: int = 3
-    # Inliers of the second re-ranking below which matching all features never pays.
+    # Inliers of the second re-ranking below which matching all features never pays
+    # (TUNING: rerank-floor).
     min_inliers: int = 11
 
     def __post_init__(self) -> None:
