@@ -32,10 +32,11 @@ class ColourHistogram:
     fingerprint = "colour_histogram:4"  # change it whenever the vectors change
 
     def describe(self, pixels: Uint8Array, /) -> Float32Array:
-        """(h, w, 3) uint8 RGB → (64,) float32 of length 1; square roots, lest the sky alone decides."""
+        """(h, w, 3) uint8 RGB → (64,) float32 of length 1; square roots tame a large sky."""
         red, green, blue = (pixels // 64).reshape(-1, 3).T
         counts = np.bincount(red * 16 + green * 4 + blue, minlength=self.dimension)
-        return np.sqrt(counts / counts.sum()).astype(np.float32)
+        vector: Float32Array = np.sqrt(counts / counts.sum()).astype(np.float32)
+        return vector
 
 
 def main() -> None:
