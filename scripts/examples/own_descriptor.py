@@ -35,8 +35,7 @@ class ColourHistogram:
         """(h, w, 3) uint8 RGB → (64,) float32 of length 1; square roots tame a large sky."""
         red, green, blue = (pixels // 64).reshape(-1, 3).T
         counts = np.bincount(red * 16 + green * 4 + blue, minlength=self.dimension)
-        vector: Float32Array = np.sqrt(counts / counts.sum()).astype(np.float32)
-        return vector
+        return np.asarray(np.sqrt(counts / counts.sum()), np.float32)
 
 
 def main() -> None:
