@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sfm_front.retrieval.retriever import RetrievalOptions
 
 
 def add_photos(group: argparse._ActionsContainer) -> None:
@@ -38,15 +42,19 @@ def add_machine(group: argparse._ActionsContainer) -> None:
     group.add_argument("--threads", type=int, metavar="N", help="cores to use (default: all)")
 
 
-def given(arguments: argparse.Namespace, *more: str) -> dict[str, Any]:
-    """Fields of ``SessionOptions`` for those of these arguments, and ``more``, that were given."""
+def given(
+    arguments: argparse.Namespace, retrieval: RetrievalOptions | None = None
+) -> dict[str, Any]:
+    """Fields of ``SessionOptions`` for those of these arguments that were given.
+
+    ``retrieval``: what it is before; it keeps what has no argument.
+    """
     from sfm_front.retrieval.retriever import RetrievalOptions
 
-    names = (
-        *("max_image_size", "max_features", "global_descriptor", "weights", "device", "threads"),
-        *more,
-    )
+    names = ("max_image_size", "max_features", "global_descriptor", "weights", "device", "threads")
     fields = {name: value for name in names if (value := getattr(arguments, name)) is not None}
     if arguments.candidates is not None:
-        fields["retrieval"] = RetrievalOptions(candidates=arguments.candidates)
+        fields["retrieval"] = replace(
+            retrieval or RetrievalOptions(), candidates=arguments.candidates
+        )
     return fields

@@ -11,6 +11,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``reconstruct``. Defaults left out here are the session's."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("folder", type=Path, help="photos, sub-folders included")
+    parser.set_defaults(usage_error=parser.error, seed_given=False)
+    parser.add_argument("folder", type=Path, nargs="?", help="photos, sub-folders included")
     parser.add_argument(
         "--output",
         type=_folder,
@@ -38,12 +40,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--overwrite", action="store_true", help="replace a reconstruction that is there"
     )
-    parser.add_argument("--text", action="store_true", help="write models as text too")
+    parser.add_argument(
+        "--text",
+        action=argparse.BooleanOptionalAction,
+        help="whether to write models as text too",
+    )
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE", help="TOML of options; flags given here win over it"
+    )
+    parser.add_argument(
+        "--print-config",
+        action="store_true",
+        help="print all options as such a file, and do nothing else",
+    )
     photos = parser.add_argument_group("photos")
     photos.add_argument(
         "--order", default="name", help="name, time of capture, or random (default: name)"
     )
-    photos.add_argument("--seed", type=int, default=0, help="of --order random and of all RANSAC")
+    photos.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        action=_Seed,
+        help="of --order random and of all RANSAC",
+    )
     shared.add_photos(photos)
     cameras = parser.add_argument_group("cameras")
     cameras.add_argument(
@@ -67,11 +87,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Reconstruct; 0 if there is a model, 1 if none could be built."""
+    """Reconstruct, or print the options; 1 if no model could be built, else 0."""
+    if arguments.print_config:
+        from sfm_front.cli.config_file import as_toml
+
+        print(as_toml(session_options(arguments)), end="")
+        return 0
+    if arguments.folder is None:
+        arguments.usage_error("the following arguments are required: folder")
     folder: Path = arguments.folder
     output: Path = arguments.output or default_output(folder)
-    photos = order_photos(list_photos(folder, exclude=output), arguments.order, seed=arguments.seed)
+    listed = list_photos(folder, exclude=output)
     options = session_options(arguments)
+    photos = order_photos(listed, arguments.order, seed=options.seed)
 
     import pycolmap
 
@@ -97,6 +125,20 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if models else 1
 
 
+class _Seed(argparse.Action):
+    """Tells a seed that was given from the default, which does not win over a file."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,  # noqa: ARG002
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,  # noqa: ARG002
+    ) -> None:
+        namespace.seed = values
+        namespace.seed_given = True
+
+
 def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("give a folder, or leave --output out")
@@ -111,25 +153,27 @@ def default_output(folder: Path) -> Path:
 
 
 def session_options(arguments: argparse.Namespace) -> SessionOptions:
-    """What was given on the command line; the rest is the session's default."""
-    from sfm_front.photos.cameras import CameraOptions
+    """What was given on the command line; the rest is of ``--config``, or the default."""
+    from sfm_front.cli.config_file import read_options
     from sfm_front.session.options import SessionOptions
-    from sfm_front.session.pair_matching import PairMatchingOptions
 
-    given = shared.given(arguments)
+    base = SessionOptions() if arguments.config is None else read_options(arguments.config)
+    given = shared.given(arguments, base.retrieval)
     if arguments.num_matched is not None:
-        given["pair_matching"] = PairMatchingOptions(num_matched=arguments.num_matched)
+        given["pair_matching"] = replace(base.pair_matching, num_matched=arguments.num_matched)
+    if arguments.text is not None:
+        given["text"] = arguments.text
+    if arguments.seed_given:
+        given["seed"] = arguments.seed
     cameras = {
         "mode": arguments.camera_mode,
         "model": arguments.camera_model,
         "params": _numbers(arguments.camera_params),
     }
-    return SessionOptions(
-        **given,
-        text=arguments.text,
-        cameras=CameraOptions(**{k: v for k, v in cameras.items() if v is not None}),
-        seed=arguments.seed,
+    given["cameras"] = replace(
+        base.cameras, **{name: value for name, value in cameras.items() if value is not None}
     )
+    return replace(base, **given)
 
 
 def _numbers(text: str | None) -> tuple[float, ...] | None:
