@@ -43,7 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
         against = arguments.against or next(iter(others), None)
         if against is None:
             raise InputError(f"{arguments.photo}: nothing to draw, it has no candidates")
-        explain(arguments.output, against)  # That there is such a photo.
         _draw(arguments.output, arguments.photos, arguments.photo, against, arguments.draw)
     return 0 if explanation.model is not None else 1
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``reconstruct``. Defaults left out here are the session's."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.set_defaults(usage_error=parser.error, seed_given=False)
+    parser.set_defaults(usage_error=parser.error)
     parser.add_argument("folder", type=Path, nargs="?", help="photos, sub-folders included")
     parser.add_argument(
         "--output",
@@ -60,9 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     photos.add_argument(
         "--seed",
         type=int,
-        default=0,
-        action=_Seed,
-        help="of --order random and of all RANSAC",
+        help="of --order random and of all RANSAC (default: 0)",
     )
     shared.add_photos(photos)
     cameras = parser.add_argument_group("cameras")
@@ -125,20 +123,6 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if models else 1
 
 
-class _Seed(argparse.Action):
-    """Tells a seed that was given from the default, which does not win over a file."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,  # noqa: ARG002
-        namespace: argparse.Namespace,
-        values: object,
-        option_string: str | None = None,  # noqa: ARG002
-    ) -> None:
-        namespace.seed = values
-        namespace.seed_given = True
-
-
 def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("give a folder, or leave --output out")
@@ -163,7 +147,7 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
         given["pair_matching"] = replace(base.pair_matching, num_matched=arguments.num_matched)
     if arguments.text is not None:
         given["text"] = arguments.text
-    if arguments.seed_given:
+    if arguments.seed is not None:
         given["seed"] = arguments.seed
     cameras = {
         "mode": arguments.camera_mode,

@@ -27,7 +27,6 @@ class _Finishing:
         self._clock = atlas.clock
 
     def run(self) -> None:
-        """Retry what waits, start afresh where the stream began badly, refine everything."""
         self._refine_until_stable()
         self._restart_largest()
         self._start_remaining()

@@ -14,7 +14,7 @@ import pycolmap
 
 from sfm_front.errors import InputError
 from sfm_front.storage.colmap_models import read_model
-from sfm_front.types import Float64Array
+from sfm_front.types import Float64Array, RejectedPair, Rejection
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +119,15 @@ def explain(output: Path, name: str) -> Explanation:
 
 
 def verified_matches(output: Path, name1: str, name2: str) -> PairMatches:
-    """The inliers of two photos' two-view geometry; none if they have no verified pair."""
+    """The inliers of two photos' two-view geometry; none if they have no verified pair.
+
+    Raises InputError if the database lacks one of the photos.
+    """
     with pycolmap.Database.open(output / "database.db") as database:
         ids = {image.name: image for image in database.read_all_images()}
+        for name in (name1, name2):
+            if name not in ids:
+                raise InputError(f"{output}: {name} is not in its database: nothing to draw")
         images = ids[name1], ids[name2]
         id1, id2 = (image.image_id for image in images)
         matches = np.zeros((0, 2), np.uint32)
@@ -178,11 +184,8 @@ def _verdict_of(
 ) -> CandidateVerdict:
     pair = ids[name], ids[candidate["name"]]
     num_verified = _num_inliers(database, *pair)
-    rejected = candidate.get("rejected")
-    why = ""
-    if rejected:
-        of = "" if rejected["matches"] is None else f" of {rejected['matches']} matches"
-        why = f"{rejected['reason']} ({rejected['inliers']}{of})"
+    rejected = candidate.get("rejected")  # None in the files of earlier versions, too.
+    why = "" if rejected is None else str(_rejected_pair(*pair, rejected))
     return CandidateVerdict(
         name=candidate["name"],
         cosine=candidate["cosine"],
@@ -191,6 +194,11 @@ def _verdict_of(
         num_matches=len(database.read_matches(*pair)) if num_verified is not None else None,
         rejected=why,
     )
+
+
+def _rejected_pair(id1: int, id2: int, rejected: Mapping[str, Any]) -> RejectedPair:
+    reason = Rejection(rejected["reason"])
+    return RejectedPair(id1, id2, reason, rejected["matches"], rejected["inliers"])
 
 
 def _num_inliers(database: pycolmap.Database, id1: int, id2: int) -> int | None:

@@ -72,6 +72,10 @@ def test_matches_are_drawn(output, folder, tmp_path, capsys):
         (["0022.jpg"], "has no photo called 0022.jpg; did you mean"),
         (["0002.jpg", "--draw", "x.png"], "--draw needs --photos"),
         (["0002.jpg", "--draw", "x.png", "--photos", "."], "no such photo"),
+        (
+            ["0002.jpg", "--draw", "x.png", "--photos", ".", "--against", "torn.jpg"],
+            "torn.jpg",
+        ),
     ],
 )
 def test_mistakes_are_one_line(output, capsys, more, told):

@@ -63,6 +63,7 @@ def parser() -> argparse.ArgumentParser:
     [
         ("--max-image-size", SessionOptions().max_image_size),
         ("--max-features", SessionOptions().max_features),
+        ("--seed", SessionOptions().seed),
         ("--camera-mode", SessionOptions().cameras.mode),
         ("--camera-model", SessionOptions().cameras.model),
         ("--global-descriptor", SessionOptions().global_descriptor),
@@ -77,7 +78,8 @@ def test_help_tells_the_defaults_of_a_session(argument, default):
 
 
 def test_the_seed_is_the_sessions_where_none_is_given():
-    assert parser().parse_args(["folder"]).seed == SessionOptions().verification.seed
+    options = reconstruct.session_options(parser().parse_args(["folder"]))
+    assert options.seed == options.verification.seed == SessionOptions().seed
 
 
 def test_what_is_not_given_is_the_sessions_default():
