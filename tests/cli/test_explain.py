@@ -72,10 +72,6 @@ def test_matches_are_drawn(output, folder, tmp_path, capsys):
         (["0022.jpg"], "has no photo called 0022.jpg; did you mean"),
         (["0002.jpg", "--draw", "x.png"], "--draw needs --photos"),
         (["0002.jpg", "--draw", "x.png", "--photos", "."], "no such photo"),
-        (
-            ["0002.jpg", "--draw", "x.png", "--photos", ".", "--against", "torn.jpg"],
-            "torn.jpg",
-        ),
     ],
 )
 def test_mistakes_are_one_line(output, capsys, more, told):
@@ -87,3 +83,12 @@ def test_mistakes_are_one_line(output, capsys, more, told):
 def test_an_output_without_a_report_is_refused(tmp_path, capsys):
     assert main(["explain", str(tmp_path), "a.jpg"]) == 2
     assert "no readable report.json" in capsys.readouterr().err
+
+
+def test_a_skipped_file_has_no_matches_to_draw(output, folder, tmp_path, capsys):
+    file = tmp_path / "matches.png"
+    argv = ["explain", str(output), "0002.jpg", "--photos", str(folder), "--draw", str(file)]
+    assert main([*argv, "--against", "torn.jpg"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "torn.jpg is not in its database: nothing to draw" in line
+    assert not file.exists()
