@@ -22,11 +22,11 @@ from sfm_front.errors import ConfigError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
 from sfm_front.evaluation.reconstruction.stream import PhotoCost, StreamResult, run_stream
+from sfm_front.events import PhotoAdded
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.model import MapperOptions
 from sfm_front.session.options import SessionOptions, available_cores
 from sfm_front.storage.json_files import write_json
-from sfm_front.types import StepReport
 
 _MIN_PHOTOS = 200
 
@@ -59,10 +59,10 @@ def run(args: argparse.Namespace) -> None:
         write_json(args.json, {"machine": machine(), "threads": threads, **asdict(result)})
 
 
-def tell(step: StepReport) -> None:
-    if step.image_id is not None and step.image_id % 50 == 0:
+def tell(photo: PhotoAdded) -> None:
+    if photo.image_id % 50 == 0:
         print(
-            f"photo {step.image_id}: {step.num_registered} registered, {step.num_points} points",
+            f"photo {photo.image_id}: {photo.num_registered} registered, {photo.num_points} points",
             file=sys.stderr,
             flush=True,
         )

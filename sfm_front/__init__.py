@@ -19,22 +19,25 @@ if TYPE_CHECKING:
         SfmFrontError,
         WeightsError,
     )
+    from sfm_front.events import Event, PhotoAdded
     from sfm_front.session.options import SessionOptions
-    from sfm_front.session.session import Session
-    from sfm_front.types import ModelSummary, PhotoPath, Skipped, StepReport
+    from sfm_front.session.session import Session, SessionResult
+    from sfm_front.types import ModelSummary, PhotoPath, Skipped
 
 __version__ = "0.1.0"
 __all__ = [
     "ConfigError",
     "DependencyError",
+    "Event",
     "InputError",
     "ModelSummary",
+    "PhotoAdded",
     "PhotoPath",
     "Session",
     "SessionOptions",
+    "SessionResult",
     "SfmFrontError",
     "Skipped",
-    "StepReport",
     "WeightsError",
     "__version__",
 ]
@@ -43,14 +46,16 @@ __all__ = [
 _MODULES = {
     "ConfigError": "errors",
     "DependencyError": "errors",
+    "Event": "events",
     "InputError": "errors",
     "ModelSummary": "types",
+    "PhotoAdded": "events",
     "PhotoPath": "types",
     "Session": "session.session",
     "SessionOptions": "session.options",
+    "SessionResult": "session.session",
     "SfmFrontError": "errors",
     "Skipped": "types",
-    "StepReport": "types",
     "WeightsError": "errors",
 }
 

@@ -152,19 +152,31 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A photo that may overlap the query.
+    """A photo that may overlap the query; ``cosine`` of the global vectors in [-1, 1]."""
 
-    ``cosine`` of the global vectors in [-1, 1]; ``inliers``: SIFT matches that survived RANSAC,
-    None if the candidate was not re-ranked; ``rotation_rad``: in-plane rotation from the query to
-    the candidate, None if it is not known; ``matches`` (K, 2): these inliers, keypoint indices in
-    the query and in the candidate.
+    image_id: int
+    cosine: float
+
+    @property
+    def inliers(self) -> None:
+        """Not known before re-ranking."""
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class RankedCandidate:
+    """A re-ranked candidate.
+
+    ``inliers``: SIFT matches that survived RANSAC, ``matches`` (inliers, 2): their keypoint indices
+    in the query and in the candidate; ``rotation_rad``: in-plane rotation from the query to the
+    candidate, None if the matches do not tell.
     """
 
     image_id: int
     cosine: float
-    inliers: int | None = None
-    rotation_rad: float | None = None
-    matches: Uint32Array | None = field(default=None, repr=False, compare=False)
+    inliers: int
+    rotation_rad: float | None
+    matches: Uint32Array = field(repr=False, compare=False)
 
 
 class Rejection(Enum):
@@ -178,15 +190,13 @@ class Rejection(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class RejectedPair:
-    """Two photos without a two-view geometry, and why.
+class Rejected:
+    """Why a pair has no two-view geometry.
 
-    ``num_matches``: tentative matches, None if they were not matched on all features;
+    ``num_matches``: tentative matches, None if the photos were not matched on all features;
     ``num_inliers``: those that survived the step that rejected the pair.
     """
 
-    image_id1: int
-    image_id2: int
     reason: Rejection
     num_matches: int | None
     num_inliers: int
@@ -214,36 +224,19 @@ class PairGeometry:
         return len(self.two_view_geometry.inlier_matches)
 
 
-# Stages that run ahead of a photo's turn, beside the mapping of those before it.
-PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})
-
-
 @dataclass(frozen=True, slots=True)
-class StepReport:
-    """What became of one photo when it arrived.
+class CandidateOutcome:
+    """What became of a candidate, by the photo's ``name``.
 
-    ``image_id`` is None and ``skipped`` is set when the photo was not used at all.
-    ``candidates`` are ordered as re-ranked; ``most_relevant`` is the first of them. ``verified``
-    names the photos with a verified pair; ``rejected`` are the pairs that were tried in vain.
-    ``registered`` names every photo placed by this step: this one, and waiting ones.
-    ``num_registered`` and ``num_points`` are those of all models after this step.
-    ``seconds`` is by stage, and work done ahead counts too. ``events`` tells what was started,
-    relaxed or joined.
+    ``inliers`` of re-ranking, None if it was not looked at; ``rejected``: why it has no verified
+    pair, None if it has one or was not matched.
     """
 
     name: str
-    image_id: int | None = None
-    skipped: Skipped | None = None
-    candidates: tuple[Candidate, ...] = ()
-    most_relevant: str | None = None
-    num_keypoints: int = 0
-    verified: tuple[str, ...] = ()
-    rejected: tuple[RejectedPair, ...] = ()
-    registered: tuple[str, ...] = ()
-    num_registered: int = 0
-    num_points: int = 0
-    seconds: dict[str, float] = field(default_factory=dict)
-    events: tuple[str, ...] = ()
+    cosine: float
+    inliers: int | None
+    verified: bool
+    rejected: Rejected | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,7 +27,8 @@ FLOORS = (
     ("features", "retrieval", "viewers", "georeference"),
     ("matching", "mapping", "storage"),
     ("runtime", "photos", "geometry"),
-    ("types", "errors", "events"),
+    ("events",),
+    ("types", "errors"),
 )
 
 # (importing module, imported module) → why it may point up all the same.

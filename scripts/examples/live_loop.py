@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from sfm_front import Session, SessionOptions, SfmFrontError
+from sfm_front import Session, SessionOptions, SfmFrontError, Skipped
 from sfm_front.photos.formats import EXTENSIONS
 
 
@@ -46,11 +46,17 @@ def main() -> None:
         parser.error(f"{arguments.folder}: no such folder")
     with Session(arguments.output, SessionOptions(global_descriptor="vlad")) as session:
         for path in arriving_photos(arguments.folder, arguments.idle):
-            step = session.add(path)
-            print(f"{step.name}: placed {', '.join(step.registered) or 'nothing yet'}", flush=True)
-        session.finish()
-    totals = session.report["totals"]
-    print(f"registered {totals['registered']} of {totals['photos']}, models: {totals['models']}")
+            photo = session.add(path)
+            if isinstance(photo, Skipped):
+                print(f"{photo.name}: skipped, {photo}", flush=True)
+            else:
+                placed = ", ".join(photo.registered) or "nothing yet"
+                print(f"{photo.name}: placed {placed}", flush=True)
+        result = session.finish()
+    totals = result.summary.totals
+    print(
+        f"registered {totals.num_registered} of {totals.num_photos}, models: {len(result.models)}"
+    )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from sfm_front import Session, SessionOptions, SfmFrontError
+from sfm_front import Session, SessionOptions, SfmFrontError, Skipped
 from sfm_front.photos.source import list_photos
 
 
@@ -21,17 +21,20 @@ def reconstruct(folder: Path, output: Path, options: SessionOptions) -> None:
     """Reconstruct the photos in ``folder`` and print what was registered."""
     photos = list_photos(folder, exclude=output)
     with Session(output, options) as session:
-        for step in session.add_all(photos):
-            print(f"{step.name}: {step.skipped or f'{step.num_registered} registered so far'}")
-        models = session.finish()
+        for photo in session.add_all(photos):
+            if isinstance(photo, Skipped):
+                print(f"{photo.name}: skipped, {photo}")
+            else:
+                print(f"{photo.name}: {photo.num_registered} registered so far")
+        result = session.finish()
 
-    for model in models:
+    for model in result.models:
         images = model.reconstruction.images
         names = sorted(images[i].name for i in model.reconstruction.reg_image_ids())
         print(f"{model.path}: {model.num_registered} photos, {model.num_points} points")
         print(f"  {', '.join(names)}")
-    registered = session.report["totals"]["registered"]
-    print(f"registered {registered} of {len(photos)} photos, models: {len(models)}")
+    registered = result.summary.totals.num_registered
+    print(f"registered {registered} of {len(photos)} photos, models: {len(result.models)}")
 
 
 def main() -> None:

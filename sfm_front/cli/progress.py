@@ -6,8 +6,9 @@ import shutil
 import time
 from typing import TextIO
 
+from sfm_front.events import Event, PhotoAdded
 from sfm_front.reports.summary import clock
-from sfm_front.types import StepReport
+from sfm_front.types import Skipped
 
 
 class LiveLine:
@@ -50,13 +51,15 @@ class ProgressLine(LiveLine):
         self._registered = 0
         self._points = 0
 
-    def show(self, step: StepReport) -> None:
-        """Count a photo and show where things stand."""
-        self._done += 1
-        if step.skipped is not None:
-            self.note(f"skipped {step.name}: {step.skipped}")
+    def show(self, event: Event) -> None:
+        """Count a photo and show where things stand; other events change nothing."""
+        if isinstance(event, Skipped):
+            self.note(f"skipped {event.name}: {event}")
+        elif isinstance(event, PhotoAdded):
+            self._registered, self._points = event.num_registered, event.num_points
         else:
-            self._registered, self._points = step.num_registered, step.num_points
+            return
+        self._done += 1
         self._write(
             f"photo {self._done}/{self._total}  registered {self._registered}  "
             f"points {self._points}  {_pace(self._started, self._done, self._total)}"

@@ -104,23 +104,22 @@ def run(arguments: argparse.Namespace) -> int:
     from sfm_front.session.session import Session
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
+    progress = ProgressLine(len(photos), sys.stdout)
     with (
-        Session(output, options, overwrite=arguments.overwrite) as session,
+        Session(output, options, overwrite=arguments.overwrite, on_event=progress.show) as session,
         _interruptible() as interrupted,
     ):
         for message in session.messages:
-            print(message)
-        progress = ProgressLine(len(photos), sys.stdout)
-        for step in session.add_all(photos):
-            progress.show(step)
+            progress.note(message)
+        for _ in session.add_all(photos):
             if interrupted():
                 progress.note("stopping: finishing with the photos taken so far")
                 break
         progress.finishing()
-        models = session.finish()
+        result = session.finish()
         progress.end()
-        print(closing_summary(session.report, output))
-    return 0 if models else 1
+        print(closing_summary(result.summary, output))
+    return 0 if result.models else 1
 
 
 def _folder(text: str) -> Path:

@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from sfm_front.events import (
+    DropReason,
+    Emit,
+    ModelDropped,
+    ModelEvent,
+    StartKind,
+)
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
 from sfm_front.mapping.model import MapperOptions, Model
 from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.types import PairGeometry, View
 
 
@@ -44,14 +50,19 @@ class Atlas:
     recovers from a bad start: a model grown from the photos that did not fit takes over the rest.
     """
 
-    def __init__(self, view_graph: ViewGraph, options: AtlasOptions | None = None) -> None:
+    def __init__(
+        self,
+        view_graph: ViewGraph,
+        options: AtlasOptions | None = None,
+        emit: Emit | None = None,
+    ) -> None:
+        """``emit`` hears what becomes of the models, when it does."""
         self.view_graph = view_graph
         self.options = options or AtlasOptions()
-        self.clock = Stopwatch()
+        self.emit = emit or _ignore
         self.initializer = Initializer(
-            view_graph, self.options.initialization, self.options.mapper, self.clock
+            view_graph, self.options.initialization, self.options.mapper, self.emit
         )
-        self._events: list[str] = []
         self.models: list[Model] = []
 
     @property
@@ -80,21 +91,8 @@ class Atlas:
         seen = max(model.num_visible_points(image_id) for model in self.models)
         return f"no pose fits the {seen} model points it sees"
 
-    def take_refinement_seconds(self) -> float:
-        """Wall seconds that global refinements took since the last call."""
-        return self.clock.seconds.pop("refine", 0.0)
-
-    def note(self, event: str) -> None:
-        """Remember what happened, for ``take_events``."""
-        self._events.append(event)
-
-    def take_events(self) -> tuple[str, ...]:
-        """What was started, relaxed, restarted or joined since the last call."""
-        events, self._events = tuple(self._events), []
-        return events
-
     def add(self, image_id: int) -> list[int]:
-        """Take in a photo of the scene and place all that can be placed.
+        """Take in a photo of the view graph and place all that can be placed.
 
         Returns the image ids that are in some model now and were in none before.
         """
@@ -107,9 +105,9 @@ class Atlas:
         return sorted(self.registered - before)
 
     def locate(self, view: View, pairs: Iterable[PairGeometry]) -> PosedCamera | None:
-        """Pose in the largest model of a photo that is not in the scene yet, by these pairs.
+        """Pose in the largest model of a photo that is not in the view graph yet, by these pairs.
 
-        None where they do not tell.
+        None if they do not tell.
         """
         if not self.models:
             return None
@@ -150,19 +148,23 @@ class Atlas:
                 kept.append(model)
                 covered |= own
             else:
-                self.note(
-                    f"model of {model.num_registered} photos dropped: a larger one holds them all"
-                )
+                self.announce_drop(model, DropReason.COVERED)
         self.models = kept
+
+    def announce_drop(self, model: Model, reason: DropReason) -> None:
+        """Emit that a model is no longer grown."""
+        self.emit(ModelDropped(model.model_id, model.num_registered, reason))
 
     def _start_near(self, image_id: int) -> None:
         """Start a model among waiting photos linked to this one, if a pair is good enough."""
         group = self.view_graph.component([image_id], among=set(self.waiting))
         if self.models and len(group) < self.options.min_second_model:
             return
-        started = self.initializer.start(group)
-        if started is not None:
-            model, event = started
-            self.note(event)
+        model = self.initializer.start(group, StartKind.STREAM)
+        if model is not None:
             self.models.append(model)
             self.grow()
+
+
+def _ignore(_: ModelEvent) -> None:
+    pass

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+from sfm_front.events import DropReason, RegisteredStructureLess, StartKind
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.initialization import Initializer
 from sfm_front.mapping.model import Model
@@ -24,7 +25,6 @@ class _Finishing:
         self._view_graph = atlas.view_graph
         self._options = atlas.options
         self._initializer = atlas.initializer
-        self._clock = atlas.clock
 
     def run(self) -> None:
         self._refine_until_stable()
@@ -36,7 +36,7 @@ class _Finishing:
             self._refine_until_stable()
         for model in self._atlas.models:
             model.finish()
-        self._atlas.models = [model for model in self._atlas.models if model.num_registered > 1]
+        self._drop_without_pairs()
         self._atlas.drop_covered()
 
     def _refine_until_stable(self) -> None:
@@ -55,20 +55,21 @@ class _Finishing:
         better of old and new stays.
         """
         failures = 0
-        for fresh, event in self._initializer.best_starts(self._options.fresh_starts):
-            largest = self._atlas.models[0] if self._atlas.models else None
-            if largest is not None and not self._misses(largest):
+        starts = self._initializer.best_starts(self._options.fresh_starts)
+        while failures < self._options.max_failures and self._misses_photos():
+            fresh = next(starts, None)
+            if fresh is None:
                 return
             fresh.grow(self._view_graph.image_ids)
-            if largest is None or fresh.num_registered > largest.num_registered:
-                self._atlas.note(f"grown afresh: {event}")
+            best = self._atlas.models[0].num_registered if self._atlas.models else 0
+            if fresh.num_registered > best:
                 self._atlas.models.insert(0, fresh)
                 self._refine_until_stable()
-            elif 2 * fresh.num_registered > largest.num_registered:
+                continue
+            self._atlas.announce_drop(fresh, DropReason.NO_BETTER)
+            if 2 * fresh.num_registered > best:
                 # It grew far and still registered no more: another start hardly will.
                 failures += 1
-                if failures == self._options.max_failures:
-                    return
 
     def _fix_intrinsics(self) -> None:
         """Grow models anew whose photos do not tell what their camera is, with what EXIF says.
@@ -78,20 +79,24 @@ class _Finishing:
         """
         miscalibrated = [model for model in self._atlas.models if model.is_miscalibrated]
         held = replace(self._options.mapper, refine_intrinsics=False)
-        initializer = Initializer(self._view_graph, self._options.initialization, held, self._clock)
+        initializer = self._initializer.with_options(held)
         for model in miscalibrated:
-            best = self._best_start(model.registered, initializer)
-            if best is None:
+            fresh = self._best_start(model.registered, initializer, StartKind.FIXED_INTRINSICS)
+            if fresh is None:
                 continue
-            fresh, event = best
-            if fresh.num_registered >= self._options.min_share * model.num_registered:
-                self._atlas.note(f"grown afresh, the camera held as EXIF has it: {event}")
-                self._atlas.models[self._atlas.models.index(model)] = fresh
+            if fresh.num_registered < self._options.min_share * model.num_registered:
+                self._atlas.announce_drop(fresh, DropReason.NO_BETTER)
+                continue
+            self._atlas.models[self._atlas.models.index(model)] = fresh
+            self._atlas.announce_drop(model, DropReason.REPLACED)
         if miscalibrated:
             self._refine_until_stable()
 
-    def _misses(self, model: Model) -> bool:
-        """Whether photos linked to a model are in none, or too many in others."""
+    def _misses_photos(self) -> bool:
+        """Whether photos linked to the largest model are in none, or too many in others."""
+        if not self._atlas.models:
+            return True
+        model = self._atlas.models[0]
         linked = self._view_graph.component(model.registered)
         if len(linked - self._atlas.registered) > self._options.max_missed_share * len(linked):
             return True
@@ -107,35 +112,36 @@ class _Finishing:
             seen |= group
             if len(group) < self._options.min_model_size:
                 continue
-            best = self._best_start(group, self._initializer)
-            if best is not None:
-                model, event = best
-                self._atlas.note(event)
+            model = self._best_start(group, self._initializer, StartKind.LAST_CALL)
+            if model is not None:
                 self._atlas.models.append(model)
                 self._refine_until_stable()
 
     def _best_start(
-        self, group: Collection[int], initializer: Initializer
-    ) -> tuple[Model, str] | None:
+        self, group: Collection[int], initializer: Initializer, kind: StartKind
+    ) -> Model | None:
         """Of the models that start within a group, the first to hold most of it, or the largest."""
-        best: tuple[Model, str] | None = None
-        while (started := initializer.start(group, last_call=True)) is not None:
-            model, _ = started
+        best: Model | None = None
+        while (model := initializer.start(group, kind, last_call=True)) is not None:
             model.grow(group)
-            if best is None or _size(model) > _size(best[0]):
-                best = started
+            worse: Model | None = model
+            if best is None or _size(model) > _size(best):
+                best, worse = model, best
+            if worse is not None:
+                self._atlas.announce_drop(worse, DropReason.NO_BETTER)
             if model.num_registered >= self._options.min_share * len(group):
                 break
         return best
 
     def _register_structure_less(self) -> bool:
         """Register photos that see too few points by two-view geometry; True if any was."""
-        placed: list[int] = []
+        any_placed = False
         for model in self._atlas.models:
-            placed += model.register_structure_less(self._atlas.candidates_of(model))
-        if placed:
-            self._atlas.note(f"{len(placed)} photos registered without structure")
-        return bool(placed)
+            placed = model.register_structure_less(self._atlas.candidates_of(model))
+            if placed:
+                any_placed = True
+                self._atlas.emit(RegisteredStructureLess(model.model_id, tuple(placed)))
+        return any_placed
 
     def _drop_small(self) -> None:
         covered: set[int] = set()
@@ -146,8 +152,15 @@ class _Finishing:
                 kept.append(model)
                 covered |= own
             else:
-                self._atlas.note(f"model with only {len(own)} photos of its own dropped")
+                self._atlas.announce_drop(model, DropReason.TOO_SMALL)
         self._atlas.models = kept
+
+    def _drop_without_pairs(self) -> None:
+        """Drop models of which the last refinement left a single photo, or none."""
+        for model in list(self._atlas.models):
+            if model.num_registered < 2:
+                self._atlas.models.remove(model)
+                self._atlas.announce_drop(model, DropReason.TOO_SMALL)
 
 
 def _size(model: Model) -> tuple[int, int]:

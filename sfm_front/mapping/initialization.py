@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import count
 
+from sfm_front.errors import ConfigError
+from sfm_front.events import Emit, ModelStarted, StartKind
 from sfm_front.mapping.model import InitialPairConstraints, MapperOptions, Model
 from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.runtime.stopwatch import Stopwatch
-
-_ANGLE_TOLERANCE = 0.7
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +63,16 @@ class InitializationOptions:
     max_trials: int = 4
     # Pairs estimated once no more photos will come.
     max_last_trials: int = 60
+    # Share of the angle asked for that a pair's own two-view geometry must show to be estimated
+    # anew: its focal length is a guess.
+    angle_tolerance: float = 0.7
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.angle_tolerance <= 1:
+            raise ConfigError(f"angle_tolerance must be from 0 to 1, got {self.angle_tolerance}")
+        for name in ("max_trials", "max_last_trials"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
 
 
 class Initializer:
@@ -70,65 +80,89 @@ class Initializer:
 
     def __init__(
         self,
-        scene: ViewGraph,
+        view_graph: ViewGraph,
         options: InitializationOptions,
         mapper_options: MapperOptions,
-        clock: Stopwatch,
+        emit: Emit,
+        *,
+        model_ids: Iterator[int] | None = None,
     ) -> None:
-        self._view_graph = scene
-        self._clock = clock
+        """``emit`` hears of each model that is started, and of its refinements."""
+        self._view_graph = view_graph
         self._options = options
         self._mapper_options = mapper_options
+        self._emit = emit
+        self._model_ids = model_ids or count(1)
         self._tried: set[tuple[int, int, int]] = set()
 
-    def start(self, group: Collection[int], *, last_call: bool = False) -> tuple[Model, str] | None:
+    def with_options(self, mapper_options: MapperOptions) -> Initializer:
+        """Another one that has tried nothing yet; it goes on with the same model ids."""
+        return Initializer(
+            self._view_graph,
+            self._options,
+            mapper_options,
+            self._emit,
+            model_ids=self._model_ids,
+        )
+
+    def start(
+        self, group: Collection[int], kind: StartKind, *, last_call: bool = False
+    ) -> Model | None:
         """A model of two photos of the group, the strictest constraints and strongest pairs first.
 
         On the last call no more photos will come, and few may be asked for as little as many.
-        Returns the model with a line on how it began, or None when the trials are used up.
+        None when the trials are used up.
         """
-        trials = self._options.max_last_trials if last_call else self._options.max_trials
-        for level, relaxation in enumerate(self._options.constraint_levels):
-            if not last_call and not _allowed(relaxation, len(group)):
+        options = self._options
+        trials = options.max_last_trials if last_call else options.max_trials
+        for number, level in enumerate(options.constraint_levels):
+            if not last_call and not _allowed(level, len(group)):
                 break
-            demanded_deg = relaxation.constraints.min_angle_deg
+            min_angle_deg = options.angle_tolerance * level.constraints.min_angle_deg
             for pair in self._view_graph.pairs(group):
-                if (*pair, level) in self._tried:
+                if (*pair, number) in self._tried:
                     continue
                 # Known from verification, with the focal length's error in it, or not at all.
                 angle_deg = self._view_graph.angle_deg(pair)
-                if angle_deg is not None and angle_deg < _ANGLE_TOLERANCE * demanded_deg:
+                if angle_deg is not None and angle_deg < min_angle_deg:
                     continue
                 if trials == 0:
                     return None
-                self._tried.add((*pair, level))
+                self._tried.add((*pair, number))
                 trials -= 1
-                model = Model(self._view_graph, self._mapper_options, self._clock)
-                if model.initialize(*pair, relaxation.constraints):
-                    return model, _describe(pair, relaxation.constraints)
+                model = self._start_from(pair, level.constraints, kind)
+                if model is not None:
+                    return model
         return None
 
-    def best_starts(self, per_relaxation: int) -> Iterator[tuple[Model, str]]:
-        """Models of two photos from the pairs that COLMAP finds best in the whole scene."""
-        for relaxation in self._options.constraint_levels:
-            if relaxation.min_waiting is None:
+    def best_starts(self, per_level: int) -> Iterator[Model]:
+        """Models of two photos from the pairs that COLMAP finds best in the whole view graph."""
+        for level in self._options.constraint_levels:
+            if level.min_waiting is None:
                 break
-            finder = Model(self._view_graph, self._mapper_options, self._clock)
-            for _ in range(per_relaxation):
-                pair = finder.find_initial_pair(relaxation.constraints)
+            finder = Model(self._view_graph, self._mapper_options)
+            for _ in range(per_level):
+                pair = finder.find_initial_pair(level.constraints)
                 if pair is None:
                     break
-                model = Model(self._view_graph, self._mapper_options, self._clock)
-                if model.initialize(*pair, relaxation.constraints):
-                    yield model, _describe(pair, relaxation.constraints)
+                model = self._start_from(pair, level.constraints, StartKind.RESTART)
+                if model is not None:
+                    yield model
+
+    def _start_from(
+        self, pair: tuple[int, int], constraints: InitialPairConstraints, kind: StartKind
+    ) -> Model | None:
+        model = Model(self._view_graph, self._mapper_options, emit=self._emit)
+        if not model.initialize(*pair, constraints):
+            return None
+        model.model_id = next(self._model_ids)
+        self._emit(
+            ModelStarted(
+                model.model_id, pair, constraints.min_angle_deg, constraints.min_inliers, kind
+            )
+        )
+        return model
 
 
-def _allowed(relaxation: ConstraintLevel, num_waiting: int) -> bool:
-    return relaxation.min_waiting is not None and num_waiting >= relaxation.min_waiting
-
-
-def _describe(pair: tuple[int, int], constraints: InitialPairConstraints) -> str:
-    return (
-        f"model started from images {pair[0]} and {pair[1]}, "
-        f"demanding {constraints.min_angle_deg:g} degrees and {constraints.min_inliers} inliers"
-    )
+def _allowed(level: ConstraintLevel, num_waiting: int) -> bool:
+    return level.min_waiting is not None and num_waiting >= level.min_waiting

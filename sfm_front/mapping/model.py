@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import copy
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import pycolmap
 
 from sfm_front.errors import ConfigError
+from sfm_front.events import Emit, ModelRefined
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
 from sfm_front.mapping.calibration import (
     CalibrationOptions,
@@ -19,7 +21,6 @@ from sfm_front.mapping.final_adjustment import final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.refinement_schedule import RefinementSchedule, ScheduleOptions
 from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.runtime.stopwatch import Stopwatch
 
 # Trials are limited here, by the points a photo sees, not by pycolmap.
 _UNLIMITED_TRIALS = 1_000_000
@@ -111,22 +112,28 @@ class MapperOptions:
 
 
 class Model:
-    """A model that grows photo by photo over a shared scene."""
+    """A model that grows photo by photo over a shared view graph."""
 
     def __init__(
-        self, scene: ViewGraph, options: MapperOptions, clock: Stopwatch | None = None
+        self,
+        view_graph: ViewGraph,
+        options: MapperOptions,
+        *,
+        emit: Emit | None = None,
     ) -> None:
-        """``clock`` counts global refinements as the stage ``refine``."""
-        self._view_graph = scene
+        """``emit`` hears of each refinement of the whole model."""
+        # 0 until whoever starts it gives it another.
+        self.model_id = 0
+        self._view_graph = view_graph
         self._options = options
-        self._clock = clock or Stopwatch()
+        self._emit = emit
         self._streaming = options.streaming()
         self._mapping = self._streaming.get_mapper()
         self._triangulation = self._streaming.get_triangulation()
         self._local = LocalRefinement(self._streaming)
         self._schedule = RefinementSchedule(options.schedule)
         self._seen_at_failure: dict[int, int] = {}
-        self._mapper, self.reconstruction = scene.new_mapper()
+        self._mapper, self.reconstruction = view_graph.new_mapper()
 
     @property
     def registered(self) -> set[int]:
@@ -209,7 +216,7 @@ class Model:
         return placed
 
     def find_initial_pair(self, constraints: InitialPairConstraints) -> tuple[int, int] | None:
-        """The best pair of the scene by COLMAP's search; each call gives another, or None."""
+        """The best pair of the view graph by COLMAP's search; each call gives another, or None."""
         options = constraints.applied_to(self._mapping)
         found = self._mapper.find_initial_image_pair(options, -1, -1)
         return None if found is None else found[0]
@@ -270,20 +277,23 @@ class Model:
         return False
 
     def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
-        with self._clock.stage("refine"):
-            # pycolmap does not count a later photo's correspondences to registered ones; taking a
-            # photo out would then fail. Beginning again over the same model counts afresh.
-            self._mapper.end_reconstruction(False)
-            self._mapper.begin_reconstruction(self.reconstruction)
-            self._mapper.iterative_global_refinement(
-                pipeline.ba_global_max_refinements,
-                pipeline.ba_global_max_refinement_change,
-                self._mapping,
-                pipeline.get_global_bundle_adjustment(),
-                self._triangulation,
-            )
+        started = time.perf_counter()
+        # pycolmap does not count a later photo's correspondences to registered ones; taking a
+        # photo out would then fail. Beginning again over the same model counts afresh.
+        self._mapper.end_reconstruction(False)
+        self._mapper.begin_reconstruction(self.reconstruction)
+        self._mapper.iterative_global_refinement(
+            pipeline.ba_global_max_refinements,
+            pipeline.ba_global_max_refinement_change,
+            self._mapping,
+            pipeline.get_global_bundle_adjustment(),
+            self._triangulation,
+        )
+        seconds = time.perf_counter() - started
         self._local.forget(self._mapper)
         self._note_refined()
+        if self._emit is not None:
+            self._emit(ModelRefined(self.model_id, self.num_registered, self.num_points, seconds))
 
     def _note_refined(self) -> None:
         self._schedule.refined(self.num_registered, self.num_points)

@@ -15,7 +15,7 @@ from sfm_front.matching.in_plane_rotation import agrees_with_rotation
 from sfm_front.matching.nearest_neighbors import MatchingOptions, match_masked
 from sfm_front.matching.verification import VerificationOptions
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate, Float64Array, PairGeometry, Uint32Array, View
+from sfm_front.types import Float64Array, PairGeometry, RankedCandidate, View
 
 _CALIBRATED = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
 
@@ -65,34 +65,31 @@ class GuidedMatcher:
         self,
         query: View,
         posed: PosedCamera,
-        candidates: Sequence[Candidate],
+        candidates: Sequence[RankedCandidate],
         views: Mapping[int, View],
         posed_others: Mapping[int, PosedCamera],
     ) -> list[PairGeometry]:
         """Pairs of the query, posed so, with those candidates whose poses are known and agree."""
         first = _side(query, posed)
 
-        def match_one(candidate: Candidate) -> PairGeometry | None:
+        def match_one(candidate: RankedCandidate) -> PairGeometry | None:
             other = posed_others.get(candidate.image_id)
-            evidence = candidate.matches
-            if other is None or evidence is None or len(evidence) < self._min_inliers:
+            if other is None or candidate.inliers < self._min_inliers:
                 return None
-            return self._pair(first, _side(views[candidate.image_id], other), candidate, evidence)
+            return self._pair(first, _side(views[candidate.image_id], other), candidate)
 
         pairs = self._workers.map(match_one, candidates)
         return [pair for pair in pairs if pair is not None]
 
-    def _pair(
-        self, first: _Side, second: _Side, candidate: Candidate, evidence: Uint32Array
-    ) -> PairGeometry | None:
+    def _pair(self, first: _Side, second: _Side, candidate: RankedCandidate) -> PairGeometry | None:
         """None if the re-ranking inliers contradict the poses or too few features match."""
         baseline = second.posed.center - first.posed.center
         if not baseline.any():
             return None
         planes = EpipolarPlanes(baseline, first.rays, second.rays)
         band_rad = self._max_error_px / second.posed.camera.mean_focal_length()
-        agreeing = np.count_nonzero(planes.distances_rad(evidence) <= band_rad)
-        if agreeing < max(self._min_inliers, self._options.min_agreeing * len(evidence)):
+        agreeing = np.count_nonzero(planes.distances_rad(candidate.matches) <= band_rad)
+        if agreeing < max(self._min_inliers, self._options.min_agreeing * candidate.inliers):
             return None
         features1, features2 = first.view.features, second.view.features
         matches = match_masked(

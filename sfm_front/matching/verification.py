@@ -13,7 +13,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.types import (
     Float64Array,
     PairGeometry,
-    RejectedPair,
+    Rejected,
     Rejection,
     Uint32Array,
     View,
@@ -74,7 +74,7 @@ class Verifier:
         """Number of inliers."""
         return len(self.inliers(view1, view2, matches))
 
-    def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | RejectedPair:
+    def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | Rejected:
         """Two-view geometry of two photos from their tentative matches (M, 2).
 
         A fundamental matrix (OpenCV's USAC) gates first: where nothing matches it takes
@@ -83,8 +83,8 @@ class Verifier:
         """
         options = self.options
 
-        def rejected(reason: Rejection, num_inliers: int) -> RejectedPair:
-            return RejectedPair(view1.image_id, view2.image_id, reason, len(matches), num_inliers)
+        def rejected(reason: Rejection, num_inliers: int) -> Rejected:
+            return Rejected(reason, len(matches), num_inliers)
 
         if len(matches) < options.min_inliers:
             return rejected(Rejection.TOO_FEW_MATCHES, 0)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import difflib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pycolmap
 
 from sfm_front.errors import InputError
+from sfm_front.reports.report_json import read_report
+from sfm_front.reports.retrieval_log import read_candidates
+from sfm_front.reports.run_summary import Outcome, RunSummary
 from sfm_front.storage.colmap_models import read_model
-from sfm_front.types import Float64Array, RejectedPair, Rejection
+from sfm_front.types import CandidateOutcome, Float64Array, Skipped
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +90,15 @@ def explain(output: Path, name: str) -> Explanation:
 
     Raises InputError if the output is not a finished one, or has no such photo.
     """
-    report = _report(output)
-    row = _row(report, name, output)
-    if row["skipped"]:
-        reason = ": ".join(filter(None, row["skipped"].values()))
-        return Explanation(name, reason, 0, (), {}, None, 0, "")
+    summary = read_report(output)
+    photo = _photo(summary, name, output)
+    if isinstance(photo, Skipped):
+        return Explanation(name, str(photo), 0, (), {}, None, 0, "")
     with pycolmap.Database.open(output / "database.db") as database:
         ids = {image.name: image.image_id for image in database.read_all_images()}
         candidates = tuple(
-            _verdict_of(database, ids, name, candidate) for candidate in _candidates(output, name)
+            _verdict_of(database, ids, name, candidate)
+            for candidate in read_candidates(output, name)
         )
         earlier = {candidate.name for candidate in candidates}
         later = {
@@ -105,16 +106,16 @@ def explain(output: Path, name: str) -> Explanation:
             for other, image_id in ids.items()
             if other not in earlier and (inliers := _num_inliers(database, ids[name], image_id))
         }
-    model = None if row["model"] is None else report["models"][row["model"]]["path"]
+    model = None if photo.model is None else summary.models[photo.model].path
     return Explanation(
         name=name,
         skipped="",
-        num_keypoints=row["keypoints"],
+        num_keypoints=photo.num_keypoints,
         candidates=candidates,
         later=later,
         model=model,
         num_points=0 if model is None else _num_points(output / model, ids[name]),
-        why_not=row["why_not_registered"] or "",
+        why_not=photo.why_not or "",
     )
 
 
@@ -148,57 +149,28 @@ def _verdict(candidate: CandidateVerdict) -> str:
     return candidate.rejected or "not matched on all features"
 
 
-def _report(output: Path) -> dict[str, Any]:
-    file = output / "report.json"
-    try:
-        content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{output}: no readable report.json in it. Give the output of a finished run."
-        ) from error
-    return content
-
-
-def _row(report: Mapping[str, Any], name: str, output: Path) -> Mapping[str, Any]:
-    rows = {row["name"]: row for row in report["photos"]}
-    if name not in rows:
-        near = difflib.get_close_matches(name, rows, n=3, cutoff=0.3)
+def _photo(summary: RunSummary, name: str, output: Path) -> Outcome:
+    photos = {photo.name: photo for photo in summary.photos}
+    if name not in photos:
+        near = difflib.get_close_matches(name, photos, n=3, cutoff=0.3)
         hint = f"; did you mean {', '.join(near)}?" if near else ""
         raise InputError(f"{output}: has no photo called {name}{hint}")
-    found: Mapping[str, Any] = rows[name]
-    return found
-
-
-def _candidates(output: Path, name: str) -> list[dict[str, Any]]:
-    with (output / "retrieval.jsonl").open(encoding="utf-8") as lines:
-        for line in lines:
-            content = json.loads(line)
-            if content["name"] == name:
-                found: list[dict[str, Any]] = content["candidates"]
-                return found
-    return []
+    return photos[name]
 
 
 def _verdict_of(
-    database: pycolmap.Database, ids: Mapping[str, int], name: str, candidate: Mapping[str, Any]
+    database: pycolmap.Database, ids: Mapping[str, int], name: str, candidate: CandidateOutcome
 ) -> CandidateVerdict:
-    pair = ids[name], ids[candidate["name"]]
+    pair = ids[name], ids[candidate.name]
     num_verified = _num_inliers(database, *pair)
-    rejected = candidate.get("rejected")  # None in the files of earlier versions, too.
-    why = "" if rejected is None else str(_rejected_pair(*pair, rejected))
     return CandidateVerdict(
-        name=candidate["name"],
-        cosine=candidate["cosine"],
-        inliers=candidate["inliers"],
+        name=candidate.name,
+        cosine=candidate.cosine,
+        inliers=candidate.inliers,
         num_verified=num_verified,
         num_matches=len(database.read_matches(*pair)) if num_verified is not None else None,
-        rejected=why,
+        rejected="" if candidate.rejected is None else str(candidate.rejected),
     )
-
-
-def _rejected_pair(id1: int, id2: int, rejected: Mapping[str, Any]) -> RejectedPair:
-    reason = Rejection(rejected["reason"])
-    return RejectedPair(id1, id2, reason, rejected["matches"], rejected["inliers"])
 
 
 def _num_inliers(database: pycolmap.Database, id1: int, id2: int) -> int | None:

@@ -4,57 +4,50 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
+
+from sfm_front.reports.run_summary import RunSummary
 
 
-def closing_summary(report: dict[str, Any], output: Path) -> str:
-    """The result in words, from the content of ``report.json``."""
-    totals = report["totals"]
+def closing_summary(summary: RunSummary, output: Path) -> str:
+    """What a user reads at the end of a run that wrote to ``output``."""
+    totals = summary.totals
     lines = [
-        f"{totals['registered']} of {totals['photos']} photos registered in "
-        f"{_plural(totals['models'], 'model')}, {clock(totals['wall_seconds'])}"
+        f"{totals.num_registered} of {totals.num_photos} photos registered in "
+        f"{_plural(len(summary.models), 'model')}, {clock(totals.wall_seconds)}"
     ]
-    for model in report["models"]:
+    for model in summary.models:
         lines.append(
-            f"  {output / model['path']}: {model['registered']} photos, "
-            f"{model['points3D']} points, {model['mean_reprojection_error_px']:.2f} px"
+            f"  {output / model.path}: {model.num_registered} photos, "
+            f"{model.num_points} points, {model.mean_reprojection_error_px:.2f} px"
         )
-    photos = max(totals["photos"], 1)
+    photos = max(totals.num_photos, 1)
     stages = ", ".join(
-        f"{stage} {seconds / photos:.3f}" for stage, seconds in totals["seconds_by_stage"].items()
+        f"{stage} {seconds / photos:.3f}" for stage, seconds in totals.seconds_by_stage.items()
     )
-    lines.append(
-        f"seconds a photo: {totals['wall_seconds'] / photos:.2f} in all; by stage, "
-        f"side by side in part: {stages}"
-    )
-    by_quarter = totals["median_seconds_by_quarter"]
+    lines.append(f"per photo: {totals.wall_seconds / photos:.2f} s wall; stages overlap: {stages}")
+    by_quarter = totals.median_seconds_by_quarter
     if len(by_quarter) == 4:
         lines.append(
-            "work on a photo, global refinement apart, median by quarter of the run: "
+            "work per photo without global refinement, median by quarter of the run: "
             + ", ".join(f"{seconds:.2f} s" for seconds in by_quarter)
         )
-    lines += _reasons(
-        "skipped",
-        [
-            (row["name"], ": ".join(filter(None, row["skipped"].values())))
-            for row in report["photos"]
-            if row["skipped"]
-        ],
-    )
+    lines += _reasons("skipped", [(photo.name, str(photo)) for photo in summary.skipped])
     lines += _reasons(
         "not registered",
-        [
-            (row["name"], row["why_not_registered"])
-            for row in report["photos"]
-            if not row["skipped"] and not row["registered"]
-        ],
+        [(photo.name, photo.why_not or "") for photo in summary.used if photo.model is None],
     )
-    if not report["models"]:
-        lines.append(
-            "no model could be built: take photos that overlap by two thirds and more, "
-            "from different places"
-        )
+    if not summary.models:
+        lines.append(_advice(summary))
     return "\n".join(lines)
+
+
+def _advice(summary: RunSummary) -> str:
+    if not summary.used:
+        return "no model could be built: no photo could be read"
+    return (
+        "no model could be built: take photos that overlap by two thirds and more, "
+        "from different places"
+    )
 
 
 def _reasons(what: str, rows: list[tuple[str, str]]) -> list[str]:

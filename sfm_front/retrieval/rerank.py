@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
 from sfm_front.matching.in_plane_rotation import in_plane_rotation
 from sfm_front.matching.matcher import Matcher
 from sfm_front.matching.verification import Verifier
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate, Uint32Array, View
+from sfm_front.types import Candidate, RankedCandidate, Uint32Array, View
 
 # Stopping early spares a third of the work and keeps the best (TUNING: rerank-batch).
 _AT_ONCE = 12
@@ -43,29 +43,30 @@ class Reranker:
     def rerank(
         self,
         query: View,
-        candidates: Sequence[Candidate],
+        candidates: Sequence[Candidate | RankedCandidate],
         views: Mapping[int, View],
         *,
         enough: int | None = None,
-    ) -> list[Candidate]:
-        """The same candidates with inliers and in-plane rotation, most inliers first, ties by
-        cosine; the first is the most relevant photo.
+    ) -> list[RankedCandidate]:
+        """Candidates by inliers, ties by cosine; the first is the most relevant photo.
 
         They are matched a dozen at a time, in the order given. Once ``enough`` have 30 inliers, the
-        remaining ones follow unchanged.
+        remaining ones are left out.
         """
-        looked_at: list[Candidate] = []
+        looked_at: list[RankedCandidate] = []
         for start in range(0, len(candidates), _AT_ONCE):
             looked_at += self._count(query, candidates[start : start + _AT_ONCE], views)
-            good = sum((candidate.inliers or 0) >= _GOOD_INLIERS for candidate in looked_at)
+            good = sum(candidate.inliers >= _GOOD_INLIERS for candidate in looked_at)
             if enough is not None and good >= enough:
                 break
-        rest = candidates[len(looked_at) :]
-        return [*sorted(looked_at, key=lambda c: (-(c.inliers or 0), -c.cosine)), *rest]
+        return sorted(looked_at, key=lambda c: (-c.inliers, -c.cosine))
 
     def _count(
-        self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]
-    ) -> list[Candidate]:
+        self,
+        query: View,
+        candidates: Sequence[Candidate | RankedCandidate],
+        views: Mapping[int, View],
+    ) -> list[RankedCandidate]:
         limit = self._options.max_features
         matches = self._matcher.match(
             query.features.largest(limit),
@@ -73,15 +74,15 @@ class Reranker:
             [None] * len(candidates),
         )
 
-        def verify(tentative: tuple[Candidate, Uint32Array]) -> Candidate:
+        def verify(tentative: tuple[Candidate | RankedCandidate, Uint32Array]) -> RankedCandidate:
             candidate, tentative_matches = tentative
             view = views[candidate.image_id]
             inliers = self._verifier.inliers(query, view, tentative_matches)
             rotation_rad = in_plane_rotation(
                 query.features.keypoints[inliers[:, 0]], view.features.keypoints[inliers[:, 1]]
             )
-            return replace(
-                candidate, inliers=len(inliers), rotation_rad=rotation_rad, matches=inliers
+            return RankedCandidate(
+                candidate.image_id, candidate.cosine, len(inliers), rotation_rad, inliers
             )
 
         return self._workers.map(verify, zip(candidates, matches, strict=True))

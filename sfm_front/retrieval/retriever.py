@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
 from sfm_front.retrieval.index import CosineIndex
-from sfm_front.types import Candidate, Float32Array
+from sfm_front.types import Candidate, Float32Array, RankedCandidate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,14 +52,14 @@ class Retriever:
         return self._index.query(vector, options.candidates, num_expansion=options.num_expansion)
 
     def rank(
-        self, vector: Float32Array, reranked: Sequence[Candidate], *, min_inliers: int
-    ) -> list[Candidate]:
+        self, vector: Float32Array, reranked: Sequence[RankedCandidate], *, min_inliers: int
+    ) -> list[Candidate | RankedCandidate]:
         """All photos: candidates with at least ``min_inliers``, as re-ranked, then the others.
 
         The others are ordered by the query expanded with the verified ones, which certainly
         overlap; without any, with its top results, as in the coarse step.
         """
-        verified = [c for c in reranked if (c.inliers or 0) >= min_inliers]
+        verified = [c for c in reranked if c.inliers >= min_inliers]
         first = {candidate.image_id for candidate in verified}
         others = self._index.query(
             vector,
@@ -68,4 +68,4 @@ class Retriever:
             expand_with=first,
         )
         known = {candidate.image_id: candidate for candidate in reranked}
-        return verified + [known.get(c.image_id, c) for c in others if c.image_id not in first]
+        return [*verified, *(known.get(c.image_id, c) for c in others if c.image_id not in first)]

@@ -16,7 +16,13 @@ from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.search.photo_index import PhotoIndex, view_of
-from sfm_front.types import Candidate, ExtractedPhoto, Float64Array, PairGeometry, PhotoPath
+from sfm_front.types import (
+    Candidate,
+    ExtractedPhoto,
+    Float64Array,
+    PairGeometry,
+    PhotoPath,
+)
 
 SearchMethod = Literal["ours", "exhaustive", "cosine"]
 

@@ -14,7 +14,14 @@ from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate, PairGeometry, RejectedPair, Rejection, Uint32Array, View
+from sfm_front.types import (
+    PairGeometry,
+    RankedCandidate,
+    Rejected,
+    Rejection,
+    Uint32Array,
+    View,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -69,14 +76,15 @@ class CandidateMatcher:
     def match(
         self,
         query: View,
-        candidates: Sequence[Candidate],
+        candidates: Sequence[RankedCandidate],
         views: Mapping[int, View],
         *,
         locate: Locate,
         poses_of: PosesOf,
         clock: Stopwatch,
-    ) -> tuple[list[PairGeometry], list[RejectedPair]]:
-        """Candidates as re-ranked → verified pairs, and what became of the others matched."""
+    ) -> tuple[list[PairGeometry], dict[int, Rejected]]:
+        """Candidates as re-ranked → verified pairs, and why others that were tried have none, by
+        image id."""
         options = self._options
         first = candidates[: options.num_matched_first]
         rest = candidates[options.num_matched_first : options.num_matched]
@@ -93,32 +101,36 @@ class CandidateMatcher:
                 rest = [candidate for candidate in rest if candidate.image_id not in found]
             more, more_rejected = self._match_unguided(query, rest, views, clock)
             pairs += more
-            rejected += more_rejected
-        _log(pairs, rejected)
+            rejected |= more_rejected
+        _log(query, pairs, rejected)
         return pairs, rejected
 
     def _match_unguided(
         self,
         query: View,
-        candidates: Sequence[Candidate],
+        candidates: Sequence[RankedCandidate],
         views: Mapping[int, View],
         clock: Stopwatch,
-    ) -> tuple[list[PairGeometry], list[RejectedPair]]:
+    ) -> tuple[list[PairGeometry], dict[int, Rejected]]:
         with clock.stage("match"):
             tentative, dismissed = self.tentative_matches(query, candidates, views)
 
-        def verify(pair: tuple[View, Uint32Array]) -> PairGeometry | RejectedPair:
+        def verify(pair: tuple[View, Uint32Array]) -> PairGeometry | Rejected:
             return self._verifier.verify(query, *pair)
 
         with clock.stage("verify"):
             verdicts = self._workers.map(verify, tentative)
         pairs = [verdict for verdict in verdicts if isinstance(verdict, PairGeometry)]
-        rejected = [verdict for verdict in verdicts if isinstance(verdict, RejectedPair)]
-        return pairs, dismissed + rejected
+        rejected = {
+            other.image_id: verdict
+            for (other, _), verdict in zip(tentative, verdicts, strict=True)
+            if isinstance(verdict, Rejected)
+        }
+        return pairs, dismissed | rejected
 
     def tentative_matches(
-        self, query: View, candidates: Sequence[Candidate], views: Mapping[int, View]
-    ) -> tuple[list[tuple[View, Uint32Array]], list[RejectedPair]]:
+        self, query: View, candidates: Sequence[RankedCandidate], views: Mapping[int, View]
+    ) -> tuple[list[tuple[View, Uint32Array]], dict[int, Rejected]]:
         """Those likely to be verified, in their order, with their matches (K, 2); and the others.
 
         If re-ranking told a candidate's in-plane rotation, only features that agree with it are
@@ -130,21 +142,14 @@ class CandidateMatcher:
         likely = [
             candidate
             for candidate in known
-            if candidate.rotation_rad is not None
-            or (candidate.inliers or 0) >= self._options.min_inliers
+            if candidate.rotation_rad is not None or candidate.inliers >= self._options.min_inliers
         ]
         chosen = {candidate.image_id for candidate in likely}
-        dismissed = [
-            RejectedPair(
-                query.image_id,
-                candidate.image_id,
-                Rejection.UNLIKELY,
-                num_matches=None,
-                num_inliers=candidate.inliers or 0,
-            )
+        dismissed = {
+            candidate.image_id: Rejected(Rejection.UNLIKELY, None, candidate.inliers)
             for candidate in known
             if candidate.image_id not in chosen
-        ]
+        }
         others = [views[candidate.image_id] for candidate in likely]
         matches = self._matcher.match(
             query.features,
@@ -154,11 +159,11 @@ class CandidateMatcher:
         return list(zip(others, matches, strict=True)), dismissed
 
 
-def _log(pairs: Sequence[PairGeometry], rejected: Sequence[RejectedPair]) -> None:
+def _log(query: View, pairs: Sequence[PairGeometry], rejected: Mapping[int, Rejected]) -> None:
     for pair in pairs:
         logger.debug(
             "images %d and %d: verified, %d of %d matches are inliers",
             *(pair.image_id1, pair.image_id2, pair.num_inliers, len(pair.matches)),
         )
-    for refused in rejected:
-        logger.debug("images %d and %d: %s", refused.image_id1, refused.image_id2, refused)
+    for image_id, why in rejected.items():
+        logger.debug("images %d and %d: %s", query.image_id, image_id, why)

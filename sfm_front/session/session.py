@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 
+from sfm_front.events import Event, Listener, ModelEvent, ModelRefined, PhotoAdded
 from sfm_front.exporters.colmap import export_models
 from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, resolve
@@ -17,7 +18,10 @@ from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import make_matcher
 from sfm_front.matching.verification import Verifier
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.reports.run_report import Report
+from sfm_front.reports.report_json import write_report
+from sfm_front.reports.retrieval_log import RetrievalLog
+from sfm_front.reports.run_report import RunReport
+from sfm_front.reports.run_summary import RunSummary
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.retrieval.retriever import Retriever
 from sfm_front.runtime.closeable import Closeable
@@ -30,12 +34,24 @@ from sfm_front.session.output_folder import check_output_folder, make_output_fol
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import (
+    Candidate,
+    CandidateOutcome,
     ExtractedPhoto,
     ModelSummary,
+    PairGeometry,
     PhotoPath,
+    RankedCandidate,
+    Rejected,
     Skipped,
-    StepReport,
 )
+
+
+@dataclass(frozen=True, slots=True)
+class SessionResult:
+    """Finished models, the largest first, and what ``report.json`` says."""
+
+    models: tuple[ModelSummary, ...]
+    summary: RunSummary
 
 
 class Session(Closeable):
@@ -45,16 +61,24 @@ class Session(Closeable):
 
         with Session(Path("outputs/flight")) as session:
             for path in paths:
-                print(session.add(path).registered)
-            models = session.finish()
+                session.add(path)
+            result = session.finish()
 
     ``output`` receives ``database.db``, ``retrieval.jsonl``, ``report.json`` and ``sparse/``.
     """
 
     def __init__(
-        self, output: Path, options: SessionOptions | None = None, *, overwrite: bool = False
+        self,
+        output: Path,
+        options: SessionOptions | None = None,
+        *,
+        overwrite: bool = False,
+        on_event: Listener | None = None,
     ) -> None:
         """``overwrite`` removes what an earlier session wrote to ``output``, and nothing else.
+
+        ``on_event`` is called with each event when it happens, in the thread that calls the
+        session: what becomes of the models while a photo is added, then the photo itself.
 
         Raises InputError if there is such a session and it may not be overwritten; ConfigError,
         WeightsError or DependencyError if the global descriptor cannot be had. Nothing has been
@@ -74,16 +98,19 @@ class Session(Closeable):
             self._open(opened, device, descriptor)
             self._opened = opened.pop_all()
         self._finished = False
+        self._on_event = on_event
+        # Since the last photo.
+        self._model_events: list[ModelEvent] = []
 
     def _open(self, opened: ExitStack, device: str, descriptor: GlobalDescriptor) -> None:
         output, threads = self.output, self.options.threads
-        self._describer = FeatureExtraction(
+        self._extraction = FeatureExtraction(
             PhotoReader(max_image_size=self.options.max_image_size),
             make_extractor(device, self.options.max_features),
             descriptor,
             num_threads=threads,
         )
-        opened.callback(self._describer.close)
+        opened.callback(self._extraction.close)
         self._workers = WorkerPool(threads)
         opened.callback(self._workers.close)
         verifier = Verifier(self.options.verification)
@@ -103,35 +130,36 @@ class Session(Closeable):
         self._database = PhotoDatabase(output / "database.db")
         opened.callback(self._database.close)
         self._view_graph = ViewGraph()
-        self._atlas = Atlas(self._view_graph, self.options.atlas)
-        self._report = Report(output)
-        opened.callback(self._report.close)
+        self._atlas = Atlas(self._view_graph, self.options.atlas, self._emit)
+        self._report = RunReport()
+        self._retrieval_log = RetrievalLog(output)
+        opened.callback(self._retrieval_log.close)
 
-    def add(self, path: Path, name: str | None = None) -> StepReport:
+    def add(self, path: Path, name: str | None = None) -> PhotoAdded | Skipped:
         """Take in one photo; ``name`` is what it is called in the models (default: the file's)."""
-        return self.add_extracted(self._describer.describe(PhotoPath(name or path.name, path)))
+        return self.add_extracted(self._extraction.describe(PhotoPath(name or path.name, path)))
 
-    def add_all(self, photos: Iterable[PhotoPath]) -> Iterator[StepReport]:
-        """Take in photos in order, the next ones described while one is matched and mapped."""
-        for described in self._describer.stream(photos):
-            yield self.add_extracted(described)
+    def add_all(self, photos: Iterable[PhotoPath]) -> Iterator[PhotoAdded | Skipped]:
+        """Take in photos in order; the next ones are described while one is matched and mapped."""
+        for extracted in self._extraction.stream(photos):
+            yield self.add_extracted(extracted)
 
-    def add_extracted(self, photo: ExtractedPhoto | Skipped) -> StepReport:
+    def add_extracted(self, photo: ExtractedPhoto | Skipped) -> PhotoAdded | Skipped:
         """Take in a photo whose features are extracted already.
 
         Raises RuntimeError once the session is finished: its models are final.
         """
         if self._finished:
             raise RuntimeError("the session is finished: begin another one for more photos")
-        if isinstance(photo, Skipped):
-            step = StepReport(photo.name, skipped=photo)
-        else:
-            step = self._place(photo)
-        self._report.add(step)
-        return step
+        added = photo if isinstance(photo, Skipped) else self._add(photo)
+        self._report.add(added)
+        if isinstance(added, PhotoAdded):
+            self._retrieval_log.add(added)
+        self._tell(added)
+        return added
 
-    def finish(self) -> list[ModelSummary]:
-        """Place what can still be placed, refine, and export all models, the largest first."""
+    def finish(self) -> SessionResult:
+        """Place what can still be placed, refine, and export all models."""
         if self._finished:
             raise RuntimeError("the session is finished already")
         self._finished = True
@@ -145,32 +173,33 @@ class Session(Closeable):
                 self.output / "sparse",
                 text=self.options.text,
             )
-        self.report = self._report.finish(
+        summary = self._report.finish(
             models,
             {i: self._atlas.why_not_registered(i) for i in self._atlas.waiting},
             seconds=clock.seconds,
-            events=self._atlas.take_events(),
+            events=self._pop_model_events(),
         )
-        return models
+        write_report(self.output, summary)
+        return SessionResult(tuple(models), summary)
 
     def close(self) -> None:
         self._opened.close()
 
-    def _place(self, photo: ExtractedPhoto) -> StepReport:
+    def _add(self, photo: ExtractedPhoto) -> PhotoAdded | Skipped:
         """The method: retrieve, re-rank, match and verify, store, map, remember."""
         clock = Stopwatch()
         view = self._catalog.admit(photo)
         if isinstance(view, Skipped):
-            return StepReport(photo.name, skipped=view)
+            return view
         image_id = view.image_id
         with clock.stage("retrieve"):
             candidates = self._retriever.candidates(photo.global_vector)
         with clock.stage("rerank"):
             enough = self.options.pair_matching.num_matched
-            candidates = self._reranker.rerank(view, candidates, self._catalog, enough=enough)
+            ranked = self._reranker.rerank(view, candidates, self._catalog, enough=enough)
         pairs, rejected = self._pairs.match(
             view,
-            candidates,
+            ranked,
             self._catalog,
             locate=self._atlas.locate,
             poses_of=self._atlas.poses_of,
@@ -182,22 +211,50 @@ class Session(Closeable):
             keypoints = photo.features.keypoints
             self._view_graph.add(image_id, photo.name, view.camera, keypoints, pairs)
             registered = self._atlas.add(image_id)
-        # Apart from the rest of mapping: it alone depends on how many photos came before.
-        clock.move("map", "refine", self._atlas.take_refinement_seconds())
         self._retriever.remember(image_id, photo.global_vector)
-        name = self._catalog.name
-        return StepReport(
+        events = self._pop_model_events()
+        # Apart from the rest of mapping: it alone depends on how many photos came before.
+        refinements = [event for event in events if isinstance(event, ModelRefined)]
+        clock.move("map", "refine", sum(event.seconds for event in refinements))
+        unranked = candidates[len(ranked) :]
+        return PhotoAdded(
             name=photo.name,
             image_id=image_id,
-            # Reports are kept to the end; what was matched is in the database.
-            candidates=tuple(replace(candidate, matches=None) for candidate in candidates),
-            most_relevant=name(candidates[0].image_id) if candidates else None,
             num_keypoints=len(photo.features),
-            verified=tuple(name(pair.image_id2) for pair in pairs),
-            rejected=tuple(rejected),
-            registered=tuple(name(i) for i in registered),
+            candidates=self._outcomes([*ranked, *unranked], pairs, rejected),
+            registered=tuple(self._catalog.name(i) for i in registered),
             num_registered=len(self._atlas.registered),
             num_points=self._atlas.num_points,
             seconds={**photo.seconds, **clock.seconds},
-            events=self._atlas.take_events(),
+            events=events,
         )
+
+    def _outcomes(
+        self,
+        candidates: Iterable[RankedCandidate | Candidate],
+        pairs: Iterable[PairGeometry],
+        rejected: Mapping[int, Rejected],
+    ) -> tuple[CandidateOutcome, ...]:
+        verified = {pair.image_id2 for pair in pairs}
+        return tuple(
+            CandidateOutcome(
+                self._catalog.name(candidate.image_id),
+                candidate.cosine,
+                candidate.inliers,
+                candidate.image_id in verified,
+                rejected.get(candidate.image_id),
+            )
+            for candidate in candidates
+        )
+
+    def _emit(self, event: ModelEvent) -> None:
+        self._model_events.append(event)
+        self._tell(event)
+
+    def _tell(self, event: Event) -> None:
+        if self._on_event is not None:
+            self._on_event(event)
+
+    def _pop_model_events(self) -> tuple[ModelEvent, ...]:
+        events, self._model_events = tuple(self._model_events), []
+        return events

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
 
 import pytest
 
 from sfm_front.cli import progress
 from sfm_front.cli.progress import CountLine, ProgressLine
-from sfm_front.reports.summary import closing_summary
-from sfm_front.types import Skipped, SkipReason, StepReport
+from sfm_front.events import ModelRefined, PhotoAdded
+from sfm_front.types import Skipped, SkipReason
 
 
 class Terminal(io.StringIO):
@@ -30,8 +29,8 @@ def turn(monkeypatch):
     return later
 
 
-def placed(name: str, registered: int, points: int) -> StepReport:
-    return StepReport(name, image_id=1, num_registered=registered, num_points=points)
+def placed(name: str, registered: int, points: int) -> PhotoAdded:
+    return PhotoAdded(name, image_id=1, num_registered=registered, num_points=points)
 
 
 def test_without_a_terminal_there_is_a_line_a_photo(turn):
@@ -53,7 +52,7 @@ def test_a_skipped_photo_is_named_with_its_reason_and_counts(turn):
     line.show(placed("a.jpg", 5, 70))
     turn(1.0)
     skipped = Skipped("süd/b.jpg", SkipReason.DUPLICATE, "same file as a.jpg")
-    line.show(StepReport("süd/b.jpg", skipped=skipped))
+    line.show(skipped)
     lines = stream.getvalue().splitlines()
     assert lines[1] == "skipped süd/b.jpg: duplicate: same file as a.jpg"
     # The skipped photo takes nothing away from what is registered.
@@ -90,75 +89,14 @@ def test_long_runs_are_told_in_hours(turn):
     assert stream.getvalue().endswith("2:00:00 left\n")
 
 
-def row(name: str, **changes: object) -> dict[str, object]:
-    plain = {"name": name, "skipped": None, "registered": True, "why_not_registered": None}
-    return plain | changes
-
-
-def content(photos: list[dict[str, object]], models: int = 1) -> dict[str, object]:
-    registered = sum(bool(photo["registered"]) for photo in photos)
-    return {
-        "photos": photos,
-        "models": [
-            {
-                "path": f"sparse/{number}",
-                "registered": registered,
-                "points3D": 1234,
-                "mean_reprojection_error_px": 0.4321,
-            }
-            for number in range(models)
-        ],
-        "totals": {
-            "photos": len(photos),
-            "registered": registered,
-            "models": models,
-            "wall_seconds": 65.0,
-            "seconds_by_stage": {"sift": 4.0, "map": 2.0},
-            "median_seconds_by_quarter": [1.0, 2.0, 2.5, 2.25],
-        },
-    }
-
-
-def test_the_summary_says_what_became_of_all():
-    photos = [
-        row("a.jpg"),
-        row("b.jpg"),
-        row("c.jpg", registered=False, why_not_registered="no verified matches"),
-        row("d.jpg", registered=False, skipped={"reason": "empty file", "detail": ""}),
-        row("e.jpg", registered=False, skipped={"reason": "too small", "detail": "20 x 20"}),
-    ]
-    assert closing_summary(content(photos), Path("out")).splitlines() == [
-        "2 of 5 photos registered in 1 model, 1:05",
-        f"  {Path('out/sparse/0')}: 2 photos, 1234 points, 0.43 px",
-        "seconds a photo: 13.00 in all; by stage, side by side in part: sift 0.800, map 0.400",
-        "work on a photo, global refinement apart, median by quarter of the run: "
-        "1.00 s, 2.00 s, 2.50 s, 2.25 s",
-        "skipped:",
-        "  d.jpg: empty file",
-        "  e.jpg: too small: 20 x 20",
-        "not registered:",
-        "  c.jpg: no verified matches",
-    ]
-
-
-def test_many_reasons_are_counted():
-    photos = [
-        row(f"{n}.jpg", registered=False, why_not_registered="far off" if n % 3 else "blurred")
-        for n in range(30)
-    ]
-    lines = closing_summary(content(photos), Path("out")).splitlines()
-    assert lines[-3:] == [
-        "not registered: 30 photos (each in report.json)",
-        "  20 × far off",
-        "  10 × blurred",
-    ]
-
-
-def test_without_a_model_it_says_what_to_do():
-    photos = [row("a.jpg", registered=False, why_not_registered="no verified matches")]
-    summary = closing_summary(content(photos, models=0), Path("out"))
-    assert summary.startswith("0 of 1 photos registered in 0 models")
-    assert "no model could be built" in summary.splitlines()[-1]
+def test_what_becomes_of_models_is_no_photo(turn):
+    stream = io.StringIO()
+    line = ProgressLine(2, stream)
+    line.show(ModelRefined(1, 2, 150, seconds=0.5))
+    assert stream.getvalue() == ""
+    turn(1.0)
+    line.show(placed("a.jpg", 0, 0))
+    assert stream.getvalue().startswith("photo 1/2")
 
 
 def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):

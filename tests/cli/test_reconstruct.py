@@ -23,6 +23,7 @@ from sfm_front.cli.main import main
 from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct import default_output
 from sfm_front.evaluation.poses import auc, pose_errors
+from sfm_front.events import Event, PhotoAdded
 from sfm_front.photos.source import list_photos, order_photos
 
 SUB_FOLDER = "süd flug ✈"
@@ -160,15 +161,16 @@ def five(tmp_path) -> Path:
 
 
 def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int) -> None:
-    """Send Ctrl-C when so many photos have been shown."""
+    """Send Ctrl-C when this many photos have been added."""
     show = ProgressLine.show
     shown = []
 
-    def show_and_interrupt(line: ProgressLine, step: object) -> None:
-        show(line, step)
-        shown.append(step)
-        if len(shown) == photos:
-            signal.raise_signal(signal.SIGINT)
+    def show_and_interrupt(line: ProgressLine, event: Event) -> None:
+        show(line, event)
+        if isinstance(event, PhotoAdded):
+            shown.append(event)
+            if len(shown) == photos:
+                signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(ProgressLine, "show", show_and_interrupt)
 

@@ -38,19 +38,25 @@ import json, sys
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from helpers.model_building import looking, make_model
+from sfm_front.reports.report_json import write_report
+from sfm_front.reports.run_summary import PhotoOutcome, RunSummary, Totals
+from sfm_front.types import Skipped, SkipReason
 output = Path(sys.argv[sys.argv.index("--output") + 1])
 for number, count in enumerate((3, 1)):
     folder = output / "sparse" / str(number)
     folder.mkdir(parents=True)
     cameras = {{f"{{i}}.jpg": looking([i, 0, 0], [0, 1, 0], [0, 0, 1]) for i in range(count)}}
     make_model(cameras).write(folder)
-photos = [
-    {{"name": "0.jpg", "skipped": None, "seconds": {{"sift": 0.5, "map": 0.25}}}},
-    {{"name": "x.jpg", "skipped": {{"reason": "empty file"}}, "registered": False}},
-    {{"name": "1.jpg", "skipped": None, "seconds": {{"sift": 1.0}}}},
-]
-totals = {{"seconds_by_stage": {{"sift": 1.5, "map": 0.25, "finish": 0.125}}}}
-(output / "report.json").write_text(json.dumps({{"photos": photos, "totals": totals}}))
+def photo(name, seconds):
+    return PhotoOutcome(name, 1, None, None, 9, None, 0, 0, (), seconds, ())
+photos = (
+    photo("0.jpg", {{"sift": 0.5, "map": 0.25}}),
+    Skipped("x.jpg", SkipReason.EMPTY_FILE),
+    photo("1.jpg", {{"sift": 1.0}}),
+)
+by_stage = {{"sift": 1.5, "map": 0.25, "finish": 0.125}}
+totals = Totals(3, 2, 0, 0, None, 1.0, by_stage, (), None)
+write_report(output, RunSummary(photos, (), {{}}, (), totals))
 (output / "arguments.json").write_text(json.dumps(sys.argv[1:]))
 """
 

@@ -11,6 +11,15 @@ import pytest
 from helpers.photo_stream import SceneFeed, position_errors_m, registered_names, true_pair
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.events import (
+    DropReason,
+    Emit,
+    ModelDropped,
+    ModelEvent,
+    ModelRefined,
+    ModelStarted,
+    StartKind,
+)
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.model import MapperOptions, Model
@@ -28,9 +37,9 @@ def orbit() -> SyntheticScene:
     return make_scene(NUM_PHOTOS, 500, seed=4, layout="orbit")
 
 
-def run(feed: SceneFeed, indices: Iterable[int]) -> Atlas:
+def run(feed: SceneFeed, indices: Iterable[int], emit: Emit | None = None) -> Atlas:
     """Photos added one at a time; the atlas before ``finish``."""
-    atlas = Atlas(feed.scene, OPTIONS)
+    atlas = Atlas(feed.scene, OPTIONS, emit)
     for index in indices:
         atlas.add(feed.add(index))
     return atlas
@@ -88,8 +97,8 @@ def test_a_camera_that_photos_do_not_tell_is_held(orbit, monkeypatch):
         Model, "is_miscalibrated", property(lambda model: model._options.refine_intrinsics)
     )
     other = make_scene(NUM_PHOTOS, 500, seed=5, layout="orbit")
-    feed = SceneFeed(orbit)
-    atlas = run(feed, range(NUM_PHOTOS))
+    feed, events = SceneFeed(orbit), []
+    atlas = run(feed, range(NUM_PHOTOS), events.append)
     elsewhere = SceneFeed(other, feed.scene, prefix="b/")
     for index in range(8):
         atlas.add(elsewhere.add(index))
@@ -102,8 +111,10 @@ def test_a_camera_that_photos_do_not_tell_is_held(orbit, monkeypatch):
     for model in atlas.models:
         camera = model.reconstruction.camera(1)
         np.testing.assert_array_equal(camera.params, orbit.camera.params)
-    held = [event for event in atlas.take_events() if "the camera held" in event]
-    assert len(held) == 2
+    started = [event for event in events if isinstance(event, ModelStarted)]
+    held = {e.model_id for e in started if e.kind is StartKind.FIXED_INTRINSICS}
+    assert held >= {model.model_id for model in atlas.models}
+    assert DropReason.REPLACED in [e.reason for e in events if isinstance(e, ModelDropped)]
 
 
 def test_two_places_are_two_models(orbit):
@@ -127,16 +138,19 @@ def test_two_places_are_two_models(orbit):
 
 def test_models_that_come_to_connect_are_joined(orbit):
     feed = SceneFeed(orbit)
-    atlas = Atlas(feed.scene, OPTIONS)
+    events: list[ModelEvent] = []
+    atlas = Atlas(feed.scene, OPTIONS, events.append)
     for index in [*range(5), *range(8, 13)]:
         atlas.add(feed.add(index))
     assert [model.num_registered for model in atlas.models] == [5, 5]
-    atlas.take_events()
     for index in [5, 6, 7, 13, 14, 15]:
         atlas.add(feed.add(index))
     finish(atlas)
     assert_whole(atlas, orbit)
-    assert any("a larger one holds them all" in event for event in atlas.take_events())
+    (dropped,) = [event for event in events if isinstance(event, ModelDropped)]
+    assert dropped.reason is DropReason.COVERED
+    assert str(dropped).startswith("model ")
+    assert dropped.model_id not in {model.model_id for model in atlas.models}
 
 
 class TruckFeed(SceneFeed):
@@ -211,11 +225,18 @@ def test_two_photos_that_know_only_each_other_say_so(orbit):
     }
 
 
-def test_events_tell_how_models_began_and_are_told_once(orbit):
-    atlas = run(SceneFeed(orbit), range(6))
-    (event,) = atlas.take_events()
-    assert event.startswith("model started from images ")
-    assert atlas.take_events() == ()
+def test_events_tell_how_models_began_and_were_refined(orbit):
+    events: list[ModelEvent] = []
+    atlas = run(SceneFeed(orbit), range(6), events.append)
+    started, *refined = events
+    assert isinstance(started, ModelStarted)
+    assert started.kind is StartKind.STREAM
+    assert set(started.image_ids) <= atlas.registered
+    assert refined
+    assert all(isinstance(event, ModelRefined) for event in refined)
+    assert {event.model_id for event in refined} == {started.model_id}
+    assert refined[-1].num_registered <= atlas.models[0].num_registered
+    assert all(event.seconds > 0 for event in refined)
 
 
 def test_an_atlas_without_photos_or_matches_ends_without_models():

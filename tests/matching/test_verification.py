@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.matching.verification import VerificationOptions, Verifier
-from sfm_front.types import Features, PairGeometry, RejectedPair, Rejection, View
+from sfm_front.types import Features, PairGeometry, Rejected, Rejection, View
 
 WIDTH, HEIGHT = 1600, 1200
 NOISE_PX = 0.5
@@ -188,7 +188,7 @@ def test_min_inliers_is_obeyed():
     )
     assert isinstance(
         Verifier(VerificationOptions(min_inliers=50)).verify(pair.view1, pair.view2, pair.matches),
-        RejectedPair,
+        Rejected,
     )
 
 
@@ -228,7 +228,7 @@ def test_count_inliers_counts_the_true_matches():
 
 
 def outcome(result: PairGeometry | Rejection) -> object:
-    if isinstance(result, RejectedPair):
+    if isinstance(result, Rejected):
         return result
     geometry = result.two_view_geometry
     return (

@@ -1,4 +1,4 @@
-"""retrieval.jsonl and report.json: what stands in them."""
+"""What a report sums up, and report.json, written and read back."""
 
 from __future__ import annotations
 
@@ -8,15 +8,18 @@ from pathlib import Path
 import pytest
 from helpers.model_building import looking, make_model
 
-from sfm_front.reports.run_report import Report
+from sfm_front.errors import InputError
+from sfm_front.events import ModelRefined, ModelStarted, PhotoAdded, StartKind
+from sfm_front.reports.report_json import read_report, write_report
+from sfm_front.reports.run_report import RunReport
+from sfm_front.reports.run_summary import RunSummary
 from sfm_front.types import (
-    Candidate,
+    CandidateOutcome,
     ModelSummary,
-    RejectedPair,
+    Rejected,
     Rejection,
     Skipped,
     SkipReason,
-    StepReport,
 )
 
 POSE = looking([0, 0, 0], [0, 1, 0], [0, 0, 1])
@@ -33,28 +36,32 @@ def summary(output: Path, number: int, names: list[str], *, error_px: float, poi
     )
 
 
-STEPS = [
-    StepReport("ä 1.jpg", image_id=1, num_keypoints=90, seconds={"sift": 0.25}),
-    StepReport("broken.jpg", skipped=Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")),
-    StepReport(
+STARTED = ModelStarted(1, (1, 2), 16.0, 100, StartKind.STREAM)
+REFINED = ModelRefined(1, 2, 50, seconds=0.5)
+BROKEN = Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")
+PHOTOS = [
+    PhotoAdded("ä 1.jpg", image_id=1, num_keypoints=90, seconds={"sift": 0.25}),
+    BROKEN,
+    PhotoAdded(
         "b.jpg",
         image_id=2,
         num_keypoints=80,
-        candidates=(Candidate(1, 0.123456, 40),),
-        most_relevant="ä 1.jpg",
-        verified=("ä 1.jpg",),
+        candidates=(CandidateOutcome("ä 1.jpg", 0.123456, 40, True, None),),
         registered=("ä 1.jpg", "b.jpg"),
         num_registered=2,
         num_points=50,
         seconds={"sift": 0.5, "map": 0.125},
-        events=("model started",),
+        events=(STARTED, REFINED),
     ),
-    StepReport(
+    PhotoAdded(
         "c.jpg",
         image_id=3,
-        candidates=(Candidate(2, 0.9, 12), Candidate(1, 0.95, 3)),
-        most_relevant="b.jpg",
-        rejected=(RejectedPair(3, 1, Rejection.NO_EPIPOLAR_GEOMETRY, 31, 9),),
+        candidates=(
+            CandidateOutcome("b.jpg", 0.9, 12, False, None),
+            CandidateOutcome(
+                "ä 1.jpg", 0.95, 3, False, Rejected(Rejection.NO_EPIPOLAR_GEOMETRY, 31, 9)
+            ),
+        ),
         num_registered=2,
         num_points=50,
     ),
@@ -62,80 +69,27 @@ STEPS = [
 
 
 @pytest.fixture
-def report(tmp_path):
-    with Report(tmp_path) as report:
-        for step in STEPS:
-            report.add(step)
-        yield report
-
-
-def finish(report: Report, output: Path) -> dict:
+def run(tmp_path) -> RunSummary:
+    report = RunReport()
+    for photo in PHOTOS:
+        report.add(photo)
     models = [
-        summary(output, 0, ["ä 1.jpg", "b.jpg"], error_px=0.5, points=300),
-        summary(output, 1, ["ä 1.jpg"], error_px=1.5, points=100),
+        summary(tmp_path, 0, ["ä 1.jpg", "b.jpg"], error_px=0.5, points=300),
+        summary(tmp_path, 1, ["ä 1.jpg"], error_px=1.5, points=100),
     ]
-    return report.finish(
-        models, {3: "no verified matches"}, seconds={"export": 0.75}, events=["refined"]
-    )
+    why_not = {3: "no verified matches"}
+    return report.finish(models, why_not, seconds={"export": 0.75}, events=[REFINED, STARTED])
 
 
-@pytest.mark.usefixtures("report")
-def test_a_line_of_retrieval_for_each_photo_that_is_used(tmp_path):
-    lines = (tmp_path / "retrieval.jsonl").read_text(encoding="utf-8").splitlines()
-    assert [json.loads(line) for line in lines] == [
-        {"name": "ä 1.jpg", "most_relevant": None, "candidates": []},
-        {
-            "name": "b.jpg",
-            "most_relevant": "ä 1.jpg",
-            "candidates": [
-                {
-                    "name": "ä 1.jpg",
-                    "cosine": 0.12346,
-                    "inliers": 40,
-                    "verified": True,
-                    "rejected": None,
-                }
-            ],
-        },
-        {
-            "name": "c.jpg",
-            "most_relevant": "b.jpg",
-            "candidates": [
-                {
-                    "name": "b.jpg",
-                    "cosine": 0.9,
-                    "inliers": 12,
-                    "verified": False,
-                    "rejected": None,
-                },
-                {
-                    "name": "ä 1.jpg",
-                    "cosine": 0.95,
-                    "inliers": 3,
-                    "verified": False,
-                    "rejected": {"reason": "no epipolar geometry", "matches": 31, "inliers": 9},
-                },
-            ],
-        },
-    ]
-    assert "ä 1.jpg" in lines[0]  # readable, not escaped
+@pytest.fixture
+def content(run, tmp_path) -> dict:
+    write_report(tmp_path, run)
+    return json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
 
 
-def test_retrieval_is_on_disk_before_the_next_photo(tmp_path):
-    with Report(tmp_path) as report:
-        report.add(STEPS[0])
-        assert len((tmp_path / "retrieval.jsonl").read_text(encoding="utf-8").splitlines()) == 1
-
-
-def test_the_file_is_what_finish_returns(report, tmp_path):
-    content = finish(report, tmp_path)
-    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == content
-    assert {path.name for path in tmp_path.iterdir()} == {"report.json", "retrieval.jsonl"}
-
-
-def test_a_row_a_photo_in_their_order(report, tmp_path):
-    first, broken, second, third = finish(report, tmp_path)["photos"]
-    assert [row["name"] for row in (first, broken, second, third)] == [s.name for s in STEPS]
+def test_a_row_a_photo_in_their_order(content):
+    first, broken, second, third = content["photos"]
+    assert [row["name"] for row in (first, broken, second, third)] == [p.name for p in PHOTOS]
     assert broken == {
         "name": "broken.jpg",
         "image_id": None,
@@ -147,17 +101,18 @@ def test_a_row_a_photo_in_their_order(report, tmp_path):
     assert (first["registered"], first["model"], first["skipped"]) == (True, 0, None)
     assert second["placed_by_this_step"] == ["ä 1.jpg", "b.jpg"]
     assert second["most_relevant"] == "ä 1.jpg"
-    assert second["verified_pairs"] == 1
+    assert (second["verified_pairs"], second["rejected_pairs"]) == (1, 0)
     assert second["keypoints"] == 80
     assert second["seconds"] == {"sift": 0.5, "map": 0.125}
-    assert second["events"] == ["model started"]
+    assert second["events"] == [str(STARTED)]  # the seconds tell of refinements
     assert (third["registered"], third["model"]) == (False, None)
+    assert (third["verified_pairs"], third["rejected_pairs"]) == (0, 1)
     assert third["why_not_registered"] == "no verified matches"
     assert first["why_not_registered"] is None
 
 
-def test_models_and_the_end(report, tmp_path):
-    content = finish(report, tmp_path)
+def test_models_and_the_end(content):
+    assert content["version"] == 1
     assert content["models"] == [
         {
             "path": "sparse/0",
@@ -174,11 +129,11 @@ def test_models_and_the_end(report, tmp_path):
             "mean_track_length": 3.25,
         },
     ]
-    assert content["end"] == {"seconds": {"export": 0.75}, "events": ["refined"]}
+    assert content["end"] == {"seconds": {"export": 0.75}, "events": [str(STARTED)]}
 
 
-def test_totals(report, tmp_path):
-    totals = finish(report, tmp_path)["totals"]
+def test_totals(content):
+    totals = content["totals"]
     assert totals.pop("wall_seconds") >= 0
     assert totals.pop("peak_memory_bytes") > 10 * 2**20
     assert totals == {
@@ -194,19 +149,40 @@ def test_totals(report, tmp_path):
     }
 
 
-def test_work_by_quarter_is_what_a_photo_waits_for_in_its_turn(tmp_path):
-    with Report(tmp_path) as report:
-        for number in range(1, 9):
-            seconds = {"match": float(number), "refine": 100.0, "sift": 10.0, "read": 1.0}
-            report.add(StepReport(f"{number}.jpg", image_id=number, seconds=seconds))
-        content = report.finish([], {}, seconds={}, events=())
-    assert content["totals"]["median_seconds_by_quarter"] == [1.5, 3.5, 5.5, 7.5]
+@pytest.mark.usefixtures("content")
+def test_what_is_read_back_is_what_was_written(run, tmp_path):
+    read = read_report(tmp_path)
+    assert read.photos == run.photos
+    assert read.models == run.models
+    assert (read.end_seconds, read.end_events) == (run.end_seconds, run.end_events)
+    assert read.totals.wall_seconds == pytest.approx(run.totals.wall_seconds, abs=1e-3)
+    assert read.totals.median_seconds_by_quarter == run.totals.median_seconds_by_quarter
+    assert [photo.name for photo in read.used] == ["ä 1.jpg", "b.jpg", "c.jpg"]
+    assert read.skipped == [BROKEN]
 
 
-def test_without_models_there_is_still_a_report(tmp_path):
-    with Report(tmp_path) as report:
-        report.add(STEPS[1])
-        content = report.finish([], {}, seconds={}, events=[])
-    assert content["models"] == []
-    assert content["totals"]["registered"] == 0
-    assert content["totals"]["mean_reprojection_error_px"] is None
+@pytest.mark.parametrize("text", [None, "", "[]", '{"photos": 3}', '{"photos": [{}]}'])
+def test_an_unreadable_report_is_refused_in_one_line(tmp_path, text):
+    if text is not None:
+        (tmp_path / "report.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"no readable report\.json") as refused:
+        read_report(tmp_path)
+    assert "\n" not in str(refused.value)
+
+
+def test_work_by_quarter_is_what_a_photo_waits_for_in_its_turn():
+    report = RunReport()
+    for number in range(1, 9):
+        seconds = {"match": float(number), "refine": 100.0, "sift": 10.0, "read": 1.0}
+        report.add(PhotoAdded(f"{number}.jpg", image_id=number, seconds=seconds))
+    run = report.finish([], {}, seconds={}, events=())
+    assert run.totals.median_seconds_by_quarter == (1.5, 3.5, 5.5, 7.5)
+
+
+def test_without_models_there_is_still_a_report():
+    report = RunReport()
+    report.add(BROKEN)
+    run = report.finish([], {}, seconds={}, events=[])
+    assert run.models == ()
+    assert run.totals.num_registered == 0
+    assert run.totals.mean_reprojection_error_px is None

@@ -15,7 +15,7 @@ from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.types import Candidate, View
+from sfm_front.types import RankedCandidate, View
 
 COSINE_TOLERANCE = 0.01
 
@@ -64,6 +64,10 @@ def unit(*numbers: float) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
+def ranked(image_id: int, cosine: float, inliers: int) -> RankedCandidate:
+    return RankedCandidate(image_id, cosine, inliers, None, np.zeros((inliers, 2), np.uint32))
+
+
 def test_of_the_others_those_like_the_verified_photos_come_first(retriever):
     """Photo 1 was verified, 2 is like it, 3 is a little more like the query alone."""
     query = unit(1, 0, 0, 0)
@@ -71,7 +75,7 @@ def test_of_the_others_those_like_the_verified_photos_come_first(retriever):
         [unit(1, 2, 0, 0), unit(1, 3, 0, 0), unit(1, 0, 2.5, 0), unit(0, 0, 0, 1)], 1
     ):
         retriever.remember(image_id, vector)
-    looked = [Candidate(1, 0.447, 40), Candidate(3, 0.371, 14)]
+    looked = [ranked(1, 0.447, 40), ranked(3, 0.371, 14)]
     found = retriever.rank(query, looked, min_inliers=15)
     assert [c.image_id for c in found] == [1, 2, 3, 4]
     assert [c.inliers for c in found] == [40, None, 14, None]
@@ -83,7 +87,7 @@ def test_where_none_was_verified_the_best_by_cosine_stand_in(retriever):
     for image_id, vector in enumerate([unit(1, 2, 0), unit(1, 3, 0), unit(1, 0, 2.5)], 1):
         retriever.remember(image_id, vector)
     (*first,) = retriever.candidates(query)
-    found = retriever.rank(query, [Candidate(1, 0.447, 14)], min_inliers=15)
+    found = retriever.rank(query, [ranked(1, 0.447, 14)], min_inliers=15)
     assert [c.image_id for c in found] == [c.image_id for c in first]
     assert found[[c.image_id for c in found].index(1)].inliers == 14
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from helpers.photo_stream import true_matches, view_of
 
@@ -19,7 +20,7 @@ from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.pair_matching import CandidateMatcher, PairMatchingOptions
-from sfm_front.types import Candidate, Features, Rejection, Uint32Array, View
+from sfm_front.types import Features, RankedCandidate, Rejection, Uint32Array, View
 
 
 class Recorder:
@@ -76,10 +77,14 @@ def pairing_of(recorder, workers):
     return make
 
 
+def ranked(image_id: int, inliers: int, rotation_rad: float | None = None) -> RankedCandidate:
+    return RankedCandidate(image_id, 0.5, inliers, rotation_rad, np.zeros((inliers, 2), np.uint32))
+
+
 def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder, pairing_of):
-    candidates = [Candidate(1, 0.5, 100, rotation_rad=0.0), Candidate(2, 0.4, 50, rotation_rad=0.0)]
+    candidates = [ranked(1, 100, rotation_rad=0.0), ranked(2, 50, rotation_rad=0.0)]
     found, rejected = pairing_of(200).tentative_matches(views[0], candidates, views)
-    assert rejected == []
+    assert rejected == {}
     whole = len(views[0].features)
     assert [asked for asked in recorder.asked if asked[1]] == [(whole, 2, True)]
     assert [view.image_id for view, _ in found] == [1, 2]
@@ -89,19 +94,19 @@ def test_what_is_known_to_be_turned_is_matched_at_once(orbit, views, recorder, p
 
 
 def test_a_stranger_gets_a_second_look_and_no_more(views, recorder, pairing_of):
-    found, rejected = pairing_of(200).tentative_matches(views[0], [Candidate(6, 0.5, 5)], views)
+    found, rejected = pairing_of(200).tentative_matches(views[0], [ranked(6, 5)], views)
     assert found == []
-    (pair,) = rejected
-    assert (pair.image_id1, pair.image_id2, pair.reason) == (0, 6, Rejection.UNLIKELY)
-    assert pair.num_matches is None
-    assert pair.num_inliers < PairMatchingOptions().min_inliers
+    assert list(rejected) == [6]
+    assert rejected[6].reason is Rejection.UNLIKELY
+    assert rejected[6].num_matches is None
+    assert rejected[6].num_inliers < PairMatchingOptions().min_inliers
     assert [asked for asked in recorder.asked if asked[1]] == [(200, 1, False)]
 
 
 def test_the_second_look_finds_what_the_first_missed(views, recorder, pairing_of):
-    missed = [Candidate(6, 0.6, 3), Candidate(1, 0.5, 3)]
+    missed = [ranked(6, 3), ranked(1, 3)]
     (found,), rejected = pairing_of(400).tentative_matches(views[0], missed, views)
-    assert [pair.image_id2 for pair in rejected] == [6]
+    assert list(rejected) == [6]
     other, matches = found
     assert other.image_id == 1
     assert len(matches) > 100
@@ -110,14 +115,15 @@ def test_the_second_look_finds_what_the_first_missed(views, recorder, pairing_of
 
 
 def test_nothing_to_match_is_nothing(views, pairing_of):
-    assert pairing_of(200).tentative_matches(views[0], [], views) == ([], [])
+    assert pairing_of(200).tentative_matches(views[0], [], views) == ([], {})
 
 
 def test_the_pose_that_the_first_pairs_tell_guides_the_rest(orbit, views, pairing_of):
     """Without one, all are matched unguided; either way each candidate gets one verdict."""
     candidates = [
-        Candidate(image_id, 0.5, 100, rotation_rad=0.0, matches=true_matches(orbit, 0, image_id))
+        RankedCandidate(image_id, 0.5, len(matches), 0.0, matches)
         for image_id in (1, 2)
+        for matches in [true_matches(orbit, 0, image_id)]
     ]
     one_first = replace_options(pairing_of(200), num_matched_first=1)
     asked = []
@@ -135,13 +141,13 @@ def test_the_pose_that_the_first_pairs_tell_guides_the_rest(orbit, views, pairin
     )
     assert asked == [(0, [1])]
     assert [pair.image_id2 for pair in pairs] == [1, 2]
-    assert rejected == []
+    assert rejected == {}
     assert clock.seconds.keys() >= {"match", "verify", "locate", "guide"}
 
 
 def test_a_rejected_pair_tells_why_and_how_many(views, pairing_of):
-    stranger = Candidate(6, 0.5, 100, rotation_rad=1.0)
-    pairs, (rejected,) = pairing_of(200).match(
+    stranger = ranked(6, 100, rotation_rad=1.0)
+    pairs, rejected = pairing_of(200).match(
         views[0],
         [stranger],
         views,
@@ -150,9 +156,9 @@ def test_a_rejected_pair_tells_why_and_how_many(views, pairing_of):
         clock=Stopwatch(),
     )
     assert pairs == []
-    assert rejected.reason in (Rejection.TOO_FEW_MATCHES, Rejection.NO_EPIPOLAR_GEOMETRY)
-    assert rejected.num_matches is not None
-    assert rejected.num_inliers < 15
+    assert rejected[6].reason in (Rejection.TOO_FEW_MATCHES, Rejection.NO_EPIPOLAR_GEOMETRY)
+    assert rejected[6].num_matches is not None
+    assert rejected[6].num_inliers < 15
 
 
 @pytest.mark.parametrize("name", ["num_matched", "num_matched_first", "min_inliers"])

@@ -15,13 +15,14 @@ from helpers.photo_stream import described, position_errors_m, registered_names,
 
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.events import Event, ModelRefined, ModelStarted, PhotoAdded
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.model import MapperOptions
 from sfm_front.photos.cameras import CameraOptions
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
-from sfm_front.types import ModelSummary, Skipped, SkipReason, StepReport
+from sfm_front.types import ModelSummary, Skipped, SkipReason
 
 NUM_PHOTOS = 16
 # The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
@@ -45,12 +46,12 @@ def orbit() -> SyntheticScene:
 
 
 @pytest.fixture(scope="module")
-def session(orbit, tmp_path_factory) -> tuple[Path, list[StepReport], list[ModelSummary]]:
+def session(orbit, tmp_path_factory) -> tuple[Path, list[PhotoAdded], list[ModelSummary]]:
     """Output folder, steps and models of the orbit in its order, the camera unknown."""
     output = tmp_path_factory.mktemp("session")
     with Session(output, options()) as session:
         steps = [session.add_extracted(described(orbit, index)) for index in range(NUM_PHOTOS)]
-        models = session.finish()
+        models = list(session.finish().models)
     return output, steps, models
 
 
@@ -141,9 +142,27 @@ def test_a_photo_that_can_be_located_is_matched_guided(session):
         assert abs(cosine) / np.linalg.norm(geometry.E) > 1 - ESSENTIAL_TOLERANCE
 
 
-def test_a_report_does_not_hold_on_to_matches(session):
-    _, steps, _ = session
-    assert all(c.matches is None for step in steps for c in step.candidates)
+def test_a_listener_hears_of_everything_as_it_happens(orbit, tmp_path):
+    heard: list[Event] = []
+    unreadable = Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")
+    with Session(tmp_path / "out", options(), on_event=heard.append) as session:
+        photos = [described(orbit, index) for index in range(4)]
+        given = [session.add_extracted(photo) for photo in (*photos, unreadable)]
+        before_the_end = len(heard)
+        result = session.finish()
+    photos_heard = [e for e in heard if isinstance(e, PhotoAdded | Skipped)]
+    assert photos_heard == given
+    # What became of the models comes before the photo that brought it, and is in its result.
+    assert isinstance(heard[0], PhotoAdded)
+    placed = next(e for e in photos_heard if isinstance(e, PhotoAdded) and e.registered)
+    first = heard.index(placed) - len(placed.events)
+    assert tuple(heard[first : heard.index(placed)]) == placed.events
+    assert any(isinstance(event, ModelStarted) for event in placed.events)
+    for photo in given[:-1]:
+        refined = [e.seconds for e in photo.events if isinstance(e, ModelRefined)]
+        assert photo.seconds.get("refine", 0) == pytest.approx(sum(refined))
+    assert any(isinstance(event, ModelRefined) for event in heard[before_the_end:])
+    assert result.summary.totals.num_registered == 4
 
 
 def test_reports_are_written(session):
@@ -162,7 +181,7 @@ def test_shuffled_photos_are_all_registered(orbit, tmp_path):
     with Session(tmp_path / "out", options()) as session:
         for index in order:
             session.add_extracted(described(orbit, index))
-        models = session.finish()
+        models = session.finish().models
     assert [model.num_registered for model in models] == [NUM_PHOTOS]
     assert position_errors_m(models[0].reconstruction, orbit).max() < POSITION_TOLERANCE_M
 
@@ -174,7 +193,7 @@ def test_two_places_give_two_models_the_largest_first(tmp_path):
             for number, place in enumerate(places):
                 if number == 1 or index < 6:
                     session.add_extracted(described(place, index, prefix=f"{number}/"))
-        models = session.finish()
+        models = session.finish().models
     assert [model.path.name for model in models] == ["0", "1"]
     assert [registered_names([model.reconstruction]) for model in models] == [
         {f"1/{places[1].name(index)}" for index in range(10)},
@@ -221,9 +240,9 @@ def test_duplicates_and_skipped_photos_take_no_image_id(orbit, tmp_path):
     with Session(tmp_path / "out", options()) as session:
         steps = [session.add_extracted(p) for p in (photo, copy, unreadable, described(orbit, 1))]
         session.finish()
-    assert [step.image_id for step in steps] == [1, None, None, 2]
-    assert steps[1].skipped == Skipped("copy.jpg", SkipReason.DUPLICATE, "same file as 000000.jpg")
-    assert steps[2].skipped == unreadable
+    assert (steps[0].image_id, steps[3].image_id) == (1, 2)
+    assert steps[1] == Skipped("copy.jpg", SkipReason.DUPLICATE, "same file as 000000.jpg")
+    assert steps[2] == unreadable
     rows = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))["photos"]
     assert [row["name"] for row in rows] == [step.name for step in steps]
 
@@ -232,13 +251,13 @@ def test_a_photo_that_is_no_file_is_skipped_by_add(tmp_path):
     with Session(tmp_path / "out", options()) as session:
         step = session.add(tmp_path / "none.jpg")
         assert step.name == "none.jpg"
-        assert step.skipped is not None
-        assert step.skipped.reason is SkipReason.UNREADABLE
+        assert isinstance(step, Skipped)
+        assert step.reason is SkipReason.UNREADABLE
 
 
 def test_no_photos_no_models(tmp_path):
     with Session(tmp_path / "out", options()) as session:
-        assert session.finish() == []
+        assert session.finish().models == ()
     assert json.loads((tmp_path / "out" / "report.json").read_text())["totals"]["photos"] == 0
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from sfm_front.evaluation.process import measure
 from sfm_front.evaluation.reconstruction.types import BenchmarkSettings, Run
+from sfm_front.reports.report_json import FILE, read_report
 from sfm_front.storage.colmap_models import find_models
 
 
@@ -26,8 +25,7 @@ def run_ours(
         [*command, str(photos), "--output", str(output), *_arguments(settings)],
         workspace / "log.txt",
     )
-    report_file = output / "report.json"
-    report = json.loads(report_file.read_text("utf-8")) if report_file.is_file() else {}
+    summary = read_report(output) if (output / FILE).is_file() else None
     models = tuple(find_models(output / "sparse"))
     failure = None
     if measured.return_code or not models:
@@ -35,8 +33,11 @@ def run_ours(
     return Run(
         wall_seconds=measured.wall_seconds,
         peak_memory_bytes=measured.peak_memory_bytes,
-        seconds_by_stage=report.get("totals", {}).get("seconds_by_stage", {}),
-        photo_seconds=_photo_seconds(report),
+        seconds_by_stage=summary.totals.seconds_by_stage if summary else {},
+        # The stages of each photo that was used, summed.
+        photo_seconds=(
+            tuple(sum(photo.seconds.values()) for photo in summary.used) if summary else ()
+        ),
         models=models,
         failure=failure,
     )
@@ -52,12 +53,3 @@ def _arguments(settings: BenchmarkSettings) -> list[str]:
         "--seed": settings.seed,
     }
     return [text for option, value in given.items() for text in (option, str(value))]
-
-
-def _photo_seconds(report: dict[str, Any]) -> tuple[float, ...]:
-    """The stages of each photo that was used, summed."""
-    return tuple(
-        sum(photo["seconds"].values())
-        for photo in report.get("photos", [])
-        if photo.get("skipped") is None
-    )

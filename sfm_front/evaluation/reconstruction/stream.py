@@ -13,10 +13,11 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import auc, pose_errors
 from sfm_front.evaluation.process import resident_bytes
 from sfm_front.evaluation.synthetic.scene import as_described, make_scene
+from sfm_front.events import PhotoAdded
 from sfm_front.features.global_descriptors.descriptor import resolve
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
-from sfm_front.types import Float64Array, StepReport
+from sfm_front.types import Float64Array
 
 _DESCRIPTOR = "vlad"
 
@@ -114,7 +115,7 @@ def run_stream(
     options: SessionOptions,
     *,
     seed: int,
-    note: Callable[[StepReport], None],
+    note: Callable[[PhotoAdded], None],
 ) -> StreamResult:
     """Fly in strips over hills and reconstruct from given features; nothing is read or detected.
 
@@ -131,20 +132,21 @@ def run_stream(
             vector = descriptor.describe(np.empty(0, np.uint8), seen.features)
             photo = as_described(seen, scene.camera, vector)
             started, processor_started = perf_counter(), process_time()
-            step = session.add_extracted(photo)
+            added = session.add_extracted(photo)
+            assert isinstance(added, PhotoAdded)  # no two photos of the scene are copies
             seconds = perf_counter() - started
             costs.append(
                 PhotoCost(
-                    seconds - step.seconds.get("refine", 0.0),
+                    seconds - added.seconds.get("refine", 0.0),
                     seconds,
                     process_time() - processor_started,
                     resident_bytes(),
-                    step.num_registered,
+                    added.num_registered,
                 )
             )
-            note(step)
+            note(added)
         started = perf_counter()
-        models = [summary.reconstruction for summary in session.finish()]
+        models = [model.reconstruction for model in session.finish().models]
         finish_seconds = perf_counter() - started
     return StreamResult(
         photos=tuple(costs),

@@ -1,0 +1,128 @@
+"""What happens in a session, as it happens: one type per kind of event."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TypeAlias
+
+from sfm_front.types import CandidateOutcome, Skipped
+
+
+class StartKind(Enum):
+    """When a model is started, and in what way."""
+
+    STREAM = "started"
+    LAST_CALL = "started at the end"
+    RESTART = "grown afresh"
+    FIXED_INTRINSICS = "grown afresh, the camera held as EXIF has it"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelStarted:
+    """A model of two photos; the pair met at least this angle and this number of inliers."""
+
+    model_id: int
+    image_ids: tuple[int, int]
+    min_angle_deg: float
+    min_inliers: int
+    kind: StartKind
+
+    def __str__(self) -> str:
+        first, second = self.image_ids
+        return (
+            f"model {self.model_id} {self.kind.value}: from images {first} and {second}, "
+            f"demanding {self.min_angle_deg:g} degrees and {self.min_inliers} inliers"
+        )
+
+
+class DropReason(Enum):
+    """Why a model is given up."""
+
+    COVERED = "a larger one holds them all"
+    NO_BETTER = "another start holds as many"
+    REPLACED = "grown afresh with its camera fixed"
+    TOO_SMALL = "too few that no larger one holds"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelDropped:
+    """A model is given up, with the photos registered in it."""
+
+    model_id: int
+    num_registered: int
+    reason: DropReason
+
+    def __str__(self) -> str:
+        return f"model {self.model_id} of {self.num_registered} photos dropped: {self.reason.value}"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelRefined:
+    """A whole model was refined, in ``seconds`` of wall time."""
+
+    model_id: int
+    num_registered: int
+    num_points: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return (
+            f"model {self.model_id} refined: {self.num_registered} photos, "
+            f"{self.num_points} points, {self.seconds:.2f} s"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class RegisteredStructureLess:
+    """Photos that see too few points were registered by two-view geometry."""
+
+    model_id: int
+    image_ids: tuple[int, ...]
+
+    def __str__(self) -> str:
+        return f"{len(self.image_ids)} photos registered without structure in model {self.model_id}"
+
+
+ModelEvent: TypeAlias = ModelStarted | ModelDropped | ModelRefined | RegisteredStructureLess
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoAdded:
+    """A photo was matched and stored, and registered if it could be.
+
+    ``candidates`` are ordered as re-ranked. ``registered`` names every photo that this step placed:
+    this one, and waiting ones. ``num_registered`` and ``num_points`` are those of all models now.
+    ``seconds`` is by stage; work done ahead counts too. ``events``: what became of the models.
+    """
+
+    name: str
+    image_id: int
+    num_keypoints: int = 0
+    candidates: tuple[CandidateOutcome, ...] = ()
+    registered: tuple[str, ...] = ()
+    num_registered: int = 0
+    num_points: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+    events: tuple[ModelEvent, ...] = ()
+
+    @property
+    def most_relevant(self) -> str | None:
+        """The first candidate; None if there was none."""
+        return self.candidates[0].name if self.candidates else None
+
+    @property
+    def verified(self) -> tuple[str, ...]:
+        """Candidates with a verified pair."""
+        return tuple(candidate.name for candidate in self.candidates if candidate.verified)
+
+
+Event: TypeAlias = Skipped | PhotoAdded | ModelEvent
+"""A photo was skipped or added, or something became of a model."""
+
+Emit: TypeAlias = Callable[[ModelEvent], None]
+Listener: TypeAlias = Callable[[Event], None]
+
+# Stages of ``PhotoAdded.seconds`` that run ahead of a photo's turn, beside the mapping of others.
+PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})

@@ -1,0 +1,150 @@
+"""``report.json``: a run summary as JSON, written and read back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from sfm_front.errors import InputError
+from sfm_front.reports.run_summary import (
+    ModelOutcome,
+    Outcome,
+    PhotoOutcome,
+    RunSummary,
+    Totals,
+)
+from sfm_front.storage.json_files import write_json
+from sfm_front.types import Skipped, SkipReason
+
+FILE = "report.json"
+
+# Raised when a key changes its meaning or goes; new keys leave it as it is.
+VERSION = 1
+
+
+def write_report(output: Path, summary: RunSummary) -> None:
+    """Write ``report.json`` to the folder ``output``. Raises InputError if that fails."""
+    totals = summary.totals
+    content = {
+        "version": VERSION,
+        "photos": [_row(photo) for photo in summary.photos],
+        "models": [
+            {
+                "path": model.path,
+                "registered": model.num_registered,
+                "points3D": model.num_points,
+                "mean_reprojection_error_px": round(model.mean_reprojection_error_px, 4),
+                "mean_track_length": round(model.mean_track_length, 3),
+            }
+            for model in summary.models
+        ],
+        "end": {"seconds": _rounded(summary.end_seconds), "events": summary.end_events},
+        "totals": {
+            "photos": totals.num_photos,
+            "used": totals.num_used,
+            "skipped": totals.num_photos - totals.num_used,
+            "registered": totals.num_registered,
+            "models": len(summary.models),
+            "points3D": totals.num_points,
+            "mean_reprojection_error_px": (
+                None
+                if totals.mean_reprojection_error_px is None
+                else round(totals.mean_reprojection_error_px, 4)
+            ),
+            "wall_seconds": round(totals.wall_seconds, 3),
+            "seconds_by_stage": _rounded(totals.seconds_by_stage),
+            "median_seconds_by_quarter": [round(s, 4) for s in totals.median_seconds_by_quarter],
+            "peak_memory_bytes": totals.peak_memory_bytes,
+        },
+    }
+    write_json(output / FILE, content)
+
+
+def read_report(output: Path) -> RunSummary:
+    """Read it back. Raises InputError if ``output`` holds none, or one that cannot be read."""
+    try:
+        content = json.loads((output / FILE).read_text(encoding="utf-8"))
+        return _summary(content)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{output}: no readable {FILE} in it. Give the output of a finished run."
+        ) from error
+
+
+def _row(photo: Outcome) -> dict[str, Any]:
+    if isinstance(photo, Skipped):
+        return {
+            "name": photo.name,
+            "image_id": None,
+            "skipped": {"reason": photo.reason.value, "detail": photo.detail},
+            "registered": False,
+            "model": None,
+        }
+    return {
+        "name": photo.name,
+        "image_id": photo.image_id,
+        "skipped": None,
+        "registered": photo.model is not None,
+        "model": photo.model,
+        "why_not_registered": photo.why_not,
+        "keypoints": photo.num_keypoints,
+        "most_relevant": photo.most_relevant,
+        "verified_pairs": photo.num_verified,
+        "rejected_pairs": photo.num_rejected,
+        "placed_by_this_step": photo.placed,
+        "seconds": _rounded(photo.seconds),
+        "events": photo.events,
+    }
+
+
+def _rounded(seconds: dict[str, float]) -> dict[str, float]:
+    return {stage: round(value, 4) for stage, value in seconds.items()}
+
+
+def _summary(content: dict[str, Any]) -> RunSummary:
+    totals = content["totals"]
+    return RunSummary(
+        photos=tuple(_outcome(row) for row in content["photos"]),
+        models=tuple(
+            ModelOutcome(
+                model["path"],
+                model["registered"],
+                model["points3D"],
+                model["mean_reprojection_error_px"],
+                model["mean_track_length"],
+            )
+            for model in content["models"]
+        ),
+        end_seconds=content["end"]["seconds"],
+        end_events=tuple(content["end"]["events"]),
+        totals=Totals(
+            num_photos=totals["photos"],
+            num_used=totals["used"],
+            num_registered=totals["registered"],
+            num_points=totals["points3D"],
+            mean_reprojection_error_px=totals["mean_reprojection_error_px"],
+            wall_seconds=totals["wall_seconds"],
+            seconds_by_stage=totals["seconds_by_stage"],
+            median_seconds_by_quarter=tuple(totals["median_seconds_by_quarter"]),
+            peak_memory_bytes=totals["peak_memory_bytes"],
+        ),
+    )
+
+
+def _outcome(row: dict[str, Any]) -> Outcome:
+    if row["skipped"]:
+        return Skipped(row["name"], SkipReason(row["skipped"]["reason"]), row["skipped"]["detail"])
+    return PhotoOutcome(
+        name=row["name"],
+        image_id=row["image_id"],
+        model=row["model"],
+        why_not=row["why_not_registered"],
+        num_keypoints=row["keypoints"],
+        most_relevant=row["most_relevant"],
+        num_verified=row["verified_pairs"],
+        num_rejected=row.get("rejected_pairs", 0),  # absent in reports of earlier versions
+        placed=tuple(row["placed_by_this_step"]),
+        seconds=row["seconds"],
+        events=tuple(row["events"]),
+    )

@@ -1,0 +1,70 @@
+"""``retrieval.jsonl``: a line per photo with its candidates, written while photos arrive."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from sfm_front.events import PhotoAdded
+from sfm_front.runtime.closeable import Closeable
+from sfm_front.types import CandidateOutcome, Rejected, Rejection
+
+FILE = "retrieval.jsonl"
+
+
+class RetrievalLog(Closeable):
+    """Writes the file; each line is on disk when ``add`` returns."""
+
+    def __init__(self, output: Path) -> None:
+        self._file = (output / FILE).open("w", encoding="utf-8")
+
+    def add(self, photo: PhotoAdded) -> None:
+        """Write a photo's line."""
+        line = {
+            "name": photo.name,
+            "most_relevant": photo.most_relevant,
+            "candidates": [_row(candidate) for candidate in photo.candidates],
+        }
+        self._file.write(json.dumps(line, ensure_ascii=False) + "\n")
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def read_candidates(output: Path, name: str) -> tuple[CandidateOutcome, ...]:
+    """Candidates of the photo called ``name``, as re-ranked; none if it has no line."""
+    with (output / FILE).open(encoding="utf-8") as lines:
+        for line in lines:
+            content = json.loads(line)
+            if content["name"] == name:
+                return tuple(_candidate(row) for row in content["candidates"])
+    return ()
+
+
+def _row(candidate: CandidateOutcome) -> dict[str, Any]:
+    rejected = candidate.rejected
+    return {
+        "name": candidate.name,
+        "cosine": round(candidate.cosine, 5),
+        "inliers": candidate.inliers,
+        "verified": candidate.verified,
+        "rejected": rejected
+        and {
+            "reason": rejected.reason.value,
+            "matches": rejected.num_matches,
+            "inliers": rejected.num_inliers,
+        },
+    }
+
+
+def _candidate(row: dict[str, Any]) -> CandidateOutcome:
+    why = row.get("rejected")  # absent in files of earlier versions
+    return CandidateOutcome(
+        row["name"],
+        row["cosine"],
+        row["inliers"],
+        row["verified"],
+        why and Rejected(Rejection(why["reason"]), why["matches"], why["inliers"]),
+    )

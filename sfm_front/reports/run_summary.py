@@ -1,0 +1,83 @@
+"""What a finished session says of itself; writers make JSON and text of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from sfm_front.types import Skipped
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoOutcome:
+    """What became of a photo that was used.
+
+    ``model``: number of the largest model that holds it; if None, ``why_not`` says why.
+    ``num_verified`` and ``num_rejected`` count its pairs with earlier photos. ``placed`` names the
+    photos that were registered when it arrived. ``seconds`` is by stage; ``events`` are in words.
+    """
+
+    name: str
+    image_id: int
+    model: int | None
+    why_not: str | None
+    num_keypoints: int
+    most_relevant: str | None
+    num_verified: int
+    num_rejected: int
+    placed: tuple[str, ...]
+    seconds: dict[str, float]
+    events: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ModelOutcome:
+    """A finished model; ``path`` is relative to the output."""
+
+    path: str
+    num_registered: int
+    num_points: int
+    mean_reprojection_error_px: float
+    mean_track_length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """The whole session in numbers.
+
+    ``median_seconds_by_quarter``: work on a photo in its turn, see ``run_report``.
+    """
+
+    num_photos: int
+    num_used: int
+    num_registered: int
+    num_points: int
+    mean_reprojection_error_px: float | None
+    wall_seconds: float
+    seconds_by_stage: dict[str, float]
+    median_seconds_by_quarter: tuple[float, ...]
+    peak_memory_bytes: int | None
+
+
+Outcome: TypeAlias = Skipped | PhotoOutcome
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """Photos in order of arrival, models largest first, and how the session ended."""
+
+    photos: tuple[Outcome, ...]
+    models: tuple[ModelOutcome, ...]
+    end_seconds: dict[str, float]
+    end_events: tuple[str, ...]
+    totals: Totals
+
+    @property
+    def used(self) -> list[PhotoOutcome]:
+        """Photos that were not skipped."""
+        return [photo for photo in self.photos if isinstance(photo, PhotoOutcome)]
+
+    @property
+    def skipped(self) -> list[Skipped]:
+        """Photos that were."""
+        return [photo for photo in self.photos if isinstance(photo, Skipped)]

@@ -1,0 +1,82 @@
+"""The closing summary: a run in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from sfm_front.reports.run_summary import ModelOutcome, Outcome, PhotoOutcome, RunSummary, Totals
+from sfm_front.reports.summary import closing_summary
+from sfm_front.types import Skipped, SkipReason
+
+PLACED = PhotoOutcome("a.jpg", 1, 0, None, 90, None, 0, 0, (), {}, ())
+
+
+def waiting(name: str, why: str) -> PhotoOutcome:
+    return replace(PLACED, name=name, model=None, why_not=why)
+
+
+def summary(photos: Sequence[Outcome], num_models: int = 1) -> RunSummary:
+    used = [photo for photo in photos if isinstance(photo, PhotoOutcome)]
+    registered = sum(photo.model is not None for photo in used)
+    models = [ModelOutcome(f"sparse/{n}", registered, 1234, 0.4321, 3.5) for n in range(num_models)]
+    return RunSummary(
+        photos=tuple(photos),
+        models=tuple(models),
+        end_seconds={},
+        end_events=(),
+        totals=Totals(
+            num_photos=len(photos),
+            num_used=len(used),
+            num_registered=registered,
+            num_points=1234,
+            mean_reprojection_error_px=0.4321,
+            wall_seconds=65.0,
+            seconds_by_stage={"sift": 4.0, "map": 2.0},
+            median_seconds_by_quarter=(1.0, 2.0, 2.5, 2.25),
+            peak_memory_bytes=None,
+        ),
+    )
+
+
+def test_the_summary_says_what_became_of_all():
+    photos = [
+        PLACED,
+        replace(PLACED, name="b.jpg"),
+        waiting("c.jpg", "no verified matches"),
+        Skipped("d.jpg", SkipReason.EMPTY_FILE),
+        Skipped("e.jpg", SkipReason.TOO_SMALL, "20 x 20"),
+    ]
+    assert closing_summary(summary(photos), Path("out")).splitlines() == [
+        "2 of 5 photos registered in 1 model, 1:05",
+        f"  {Path('out/sparse/0')}: 2 photos, 1234 points, 0.43 px",
+        "per photo: 13.00 s wall; stages overlap: sift 0.800, map 0.400",
+        "work per photo without global refinement, median by quarter of the run: "
+        "1.00 s, 2.00 s, 2.50 s, 2.25 s",
+        "skipped:",
+        "  d.jpg: empty file",
+        "  e.jpg: too small: 20 x 20",
+        "not registered:",
+        "  c.jpg: no verified matches",
+    ]
+
+
+def test_many_reasons_are_counted():
+    photos = [waiting(f"{n}.jpg", "far off" if n % 3 else "blurred") for n in range(30)]
+    assert closing_summary(summary(photos), Path("out")).splitlines()[-3:] == [
+        "not registered: 30 photos (each in report.json)",
+        "  20 × far off",
+        "  10 × blurred",
+    ]
+
+
+def test_without_a_model_it_says_what_to_do():
+    text = closing_summary(summary([waiting("a.jpg", "no verified matches")], 0), Path("out"))
+    assert text.startswith("0 of 1 photos registered in 0 models")
+    assert "overlap" in text.splitlines()[-1]
+
+
+def test_where_nothing_could_be_read_more_overlap_is_no_advice():
+    text = closing_summary(summary([Skipped("a.jpg", SkipReason.TRUNCATED)], 0), Path("out"))
+    assert text.splitlines()[-1] == "no model could be built: no photo could be read"
