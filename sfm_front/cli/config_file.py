@@ -1,8 +1,8 @@
 """The options of a session as a TOML file: written with all values, read and checked.
 
 A table of the file is a dataclass of the options, an array of tables a tuple of them. What a file
-leaves out keeps its default. ``threads`` and ``seed`` are set at its top alone: the parts that
-take them from there have no such key.
+leaves out keeps its default. Options that several parts share, such as ``threads``, are set once:
+the parts that take them from there have no such key.
 """
 
 from __future__ import annotations
@@ -30,9 +30,12 @@ if TYPE_CHECKING:
 
 _Options = TypeVar("_Options", bound="DataclassInstance")
 
-SET_AT_THE_TOP = {
+TAKEN_FROM = {
     "atlas.mapper.num_threads": "threads",
     "atlas.mapper.seed": "seed",
+    "atlas.mapper.robust.num_threads": "threads",
+    "atlas.mapper.robust.refine_intrinsics": "atlas.mapper.refine_intrinsics",
+    "atlas.mapper.robust.large_from": "atlas.mapper.schedule.large_from",
     "atlas.localization.seed": "seed",
     "verification.seed": "seed",
 }
@@ -86,7 +89,7 @@ def _lines(options: DataclassInstance, name: str) -> Iterator[str]:
     for field in dataclasses.fields(options):
         value = getattr(options, field.name)
         key = _dotted(name, field.name)
-        if key in SET_AT_THE_TOP:
+        if key in TAKEN_FROM:
             continue
         if value is None:
             yield f"# {field.name}: not set"
@@ -135,8 +138,8 @@ def _built(
     values: dict[str, Any] = {}
     for key, value in table.items():
         full = _dotted(name, key)
-        if full in SET_AT_THE_TOP:
-            raise ConfigError(f"{full}: set {SET_AT_THE_TOP[full]} at the top of the file instead")
+        if full in TAKEN_FROM:
+            raise ConfigError(f"{full}: set {TAKEN_FROM[full]} instead")
         if key not in types:
             raise ConfigError(f"{full}: no such key; did you mean {_nearest(key, name, kind)}?")
         values[key] = _read(types[key], value, full, getattr(base, key, None))
@@ -212,7 +215,7 @@ def _nearest(key: str, name: str, kind: type[DataclassInstance]) -> str:
     siblings = [
         field.name
         for field in dataclasses.fields(kind)
-        if _dotted(name, field.name) not in SET_AT_THE_TOP
+        if _dotted(name, field.name) not in TAKEN_FROM
     ]
     close = difflib.get_close_matches(key, siblings, n=1)
     elsewhere = [known for known in _known(SessionOptions, "") if known.split(".")[-1] == key]
@@ -225,7 +228,7 @@ def _known(kind: type[DataclassInstance], name: str) -> Iterator[str]:
     """The full names of all keys, without those of arrays of tables."""
     for key, declared in get_type_hints(kind).items():
         full = _dotted(name, key)
-        if full not in SET_AT_THE_TOP:
+        if full not in TAKEN_FROM:
             yield full
         if dataclasses.is_dataclass(declared) and isinstance(declared, type):
             yield from _known(declared, full)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from sfm_front.errors import ConfigError
 from sfm_front.events import (
     DropReason,
     Emit,
@@ -40,6 +41,17 @@ class AtlasOptions:
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
+
+    def __post_init__(self) -> None:
+        for name in ("min_second_model", "min_model_size"):
+            if getattr(self, name) < 2:
+                raise ConfigError(f"{name} must be at least 2, got {getattr(self, name)}")
+        for name in ("max_missed_share", "min_share"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ConfigError(f"{name} must be from 0 to 1, got {getattr(self, name)}")
+        for name in ("fresh_starts", "max_failures"):
+            if getattr(self, name) < 0:
+                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}")
 
 
 class Atlas:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import pycolmap
 
+from sfm_front.errors import ConfigError
 from sfm_front.mapping.refinement_schedule import LARGE
 
 
@@ -15,11 +16,22 @@ class RobustAdjustmentOptions:
 
     # Reprojection error from which the Cauchy loss gives way (TUNING: robust-loss).
     loss_scale_px: float = 1.0
+    # Relative change of the cost at which it stops, and that for large models: long flights stay
+    # bent with the looser one (TUNING: robust-tolerance).
+    tolerance: float = 1e-4
+    large_tolerance: float = 1e-6
     # Whether focal length and distortion may move, and the principal point of an unknown camera.
     refine_intrinsics: bool = True
     num_threads: int = 2
     # Registered photos from which the adjustment runs longer, as in ``ScheduleOptions``.
     large_from: int = LARGE
+
+    def __post_init__(self) -> None:
+        if self.loss_scale_px <= 0:
+            raise ConfigError(f"loss_scale_px must be above 0, got {self.loss_scale_px}")
+        for name in ("tolerance", "large_tolerance"):
+            if getattr(self, name) < 0:
+                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}")
 
 
 def adjust_robustly(
@@ -36,9 +48,10 @@ def adjust_robustly(
     adjustment.refine_principal_point = principal_point
     adjustment.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     adjustment.ceres.loss_function_scale = options.loss_scale_px
-    # Long flights stay bent with the looser tolerance (TUNING: robust-tolerance).
     large = reconstruction.num_reg_images() >= options.large_from
-    adjustment.ceres.solver_options.function_tolerance = 1e-6 if large else 1e-4
+    adjustment.ceres.solver_options.function_tolerance = (
+        options.large_tolerance if large else options.tolerance
+    )
     adjustment.ceres.solver_options.num_threads = options.num_threads
     config = pycolmap.BundleAdjustmentConfig()
     for image_id in reconstruction.reg_image_ids():

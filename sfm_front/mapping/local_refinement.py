@@ -2,12 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pycolmap
 
-from sfm_front.mapping.refinement_schedule import local_refinement_batch
+from sfm_front.errors import ConfigError
 
-# Points in more photos than this stay fixed: they hardly move, and would pull all photos in.
-_MAX_TRACK_LENGTH = 15
+
+@dataclass(frozen=True, kw_only=True)
+class LocalRefinementOptions:
+    """How the neighbourhood of new photos is refined."""
+
+    # A model of this many photos refines two new ones at a time, of twice as many three: keeps the
+    # cost per photo constant (TUNING: local-batch).
+    photos_per_batch: int = 250
+    # Points in more photos than this stay fixed: they hardly move, and would pull all photos in.
+    max_track_length: int = 15
+
+    def __post_init__(self) -> None:
+        for name in ("photos_per_batch", "max_track_length"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
+
+    def batch_size(self, num_images: int) -> int:
+        """Number of new photos that share a local refinement in a model of this size."""
+        return 1 + num_images // self.photos_per_batch
 
 
 class LocalRefinement:
@@ -17,16 +36,22 @@ class LocalRefinement:
     shares that check, so that the cost per photo stays constant (TUNING: local-batch).
     """
 
-    def __init__(self, options: pycolmap.IncrementalPipelineOptions) -> None:
-        self._mapping = options.get_mapper()
-        self._triangulation = options.get_triangulation()
-        self._adjustment = options.get_local_bundle_adjustment()
+    def __init__(
+        self,
+        pipeline: pycolmap.IncrementalPipelineOptions,
+        options: LocalRefinementOptions | None = None,
+    ) -> None:
+        self._options = options or LocalRefinementOptions()
+        self._mapping = pipeline.get_mapper()
+        self._triangulation = pipeline.get_triangulation()
+        self._adjustment = pipeline.get_local_bundle_adjustment()
         self._waiting: list[int] = []
 
     def add(self, mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
         """Refine around a newly registered and triangulated photo, now or with its batch."""
         self._waiting.append(image_id)
-        if len(self._waiting) >= local_refinement_batch(mapper.reconstruction.num_reg_images()):
+        num_images = mapper.reconstruction.num_reg_images()
+        if len(self._waiting) >= self._options.batch_size(num_images):
             self._refine(mapper)
             self.forget(mapper)
 
@@ -40,7 +65,7 @@ class LocalRefinement:
         bundle = around.union(self._waiting)
         modified = mapper.get_modified_points3D()
         if around:
-            short = {i for i in modified if _is_short(mapper.reconstruction.point3D(i))}
+            short = {i for i in modified if self._is_short(mapper.reconstruction.point3D(i))}
             self._adjust(mapper, bundle, short)
             mapper.triangulator.merge_tracks(self._triangulation, short)
             mapper.triangulator.complete_tracks(self._triangulation, short)
@@ -69,6 +94,5 @@ class LocalRefinement:
             config.add_variable_point(point_id)
         pycolmap.create_default_bundle_adjuster(self._adjustment, config, model).solve()
 
-
-def _is_short(point: pycolmap.Point3D) -> bool:
-    return not point.has_error() or point.track.length() <= _MAX_TRACK_LENGTH
+    def _is_short(self, point: pycolmap.Point3D) -> bool:
+        return not point.has_error() or point.track.length() <= self._options.max_track_length

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pycolmap
 
@@ -18,7 +18,7 @@ from sfm_front.mapping.calibration import (
     is_miscalibrated,
 )
 from sfm_front.mapping.final_adjustment import final_adjustment
-from sfm_front.mapping.local_refinement import LocalRefinement
+from sfm_front.mapping.local_refinement import LocalRefinement, LocalRefinementOptions
 from sfm_front.mapping.refinement_schedule import RefinementSchedule, ScheduleOptions
 from sfm_front.mapping.view_graph import ViewGraph
 
@@ -58,17 +58,49 @@ class InitialPairConstraints:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ConvergenceOptions:
+    """When COLMAP's bundle adjustments stop: tolerances are relative changes of the cost.
+
+    While photos arrive, each adjustment starts close to its optimum and another one follows, so it
+    may stop early (TUNING: streaming-adjustment).
+    """
+
+    # Local adjustments while photos arrive.
+    local_tolerance: float = 1e-4
+    local_iterations: int = 12
+    # Global ones while photos arrive, and how often each alternates with filtering at most.
+    global_tolerance: float = 1e-4
+    global_iterations: int = 15
+    global_refinements: int = 2
+    # Global ones of a complete model, and of a large one. COLMAP's own tolerance is 0. 1e-6 gives
+    # the same model; with 1e-5 a long flight stays bent (TUNING: final-tolerance).
+    final_tolerance: float = 1e-5
+    large_final_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        for name in vars(self):
+            least = 0 if name.endswith("tolerance") else 1
+            if getattr(self, name) < least:
+                raise ConfigError(f"{name} must be at least {least}, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, kw_only=True)
 class MapperOptions:
     """How a model is grown. Everything else is COLMAP's default."""
 
     # A photo that failed is retried once it sees this many times the points.
     retry_growth: float = 1.2
+    # Refine focal length and distortion.
     refine_intrinsics: bool = True
     # Of the bundle adjustment.
     num_threads: int = 2
     # Of all RANSAC.
     seed: int = 0
     schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
+    convergence: ConvergenceOptions = field(default_factory=ConvergenceOptions)
+    local_refinement: LocalRefinementOptions = field(default_factory=LocalRefinementOptions)
+    # The last adjustment; it takes threads, intrinsics and what counts as large from here.
+    robust: RobustAdjustmentOptions = field(default_factory=RobustAdjustmentOptions)
     calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
 
     def __post_init__(self) -> None:
@@ -76,16 +108,20 @@ class MapperOptions:
             raise ConfigError(f"retry_growth must be at least 1, got {self.retry_growth}")
         if self.num_threads < 1:
             raise ConfigError(f"num_threads must be at least 1, got {self.num_threads}")
+        robust = replace(
+            self.robust,
+            refine_intrinsics=self.refine_intrinsics,
+            num_threads=self.num_threads,
+            large_from=self.schedule.large_from,
+        )
+        object.__setattr__(self, "robust", robust)
 
     def final(self, num_photos: int) -> pycolmap.IncrementalPipelineOptions:
-        """pycolmap's options for a complete model of ``num_photos``.
-
-        COLMAP's own tolerance is 0. 1e-6 gives the same model; with 1e-5 a long flight stays bent
-        (TUNING: final-tolerance).
-        """
+        """pycolmap's options for a complete model of ``num_photos``."""
         options = pycolmap.IncrementalPipelineOptions()
+        large = num_photos >= self.schedule.large_from
         options.ba_global_function_tolerance = (
-            1e-6 if num_photos >= self.schedule.large_from else 1e-5
+            self.convergence.large_final_tolerance if large else self.convergence.final_tolerance
         )
         options.num_threads = self.num_threads
         options.random_seed = self.seed
@@ -97,17 +133,13 @@ class MapperOptions:
         return options
 
     def streaming(self) -> pycolmap.IncrementalPipelineOptions:
-        """The same with bundle adjustments that stop early.
-
-        While photos arrive, each adjustment starts close to its optimum and another one follows
-        (TUNING: streaming-adjustment).
-        """
+        """The same while photos arrive, with bundle adjustments that stop early."""
         options = self.final(0)
-        options.ba_local_function_tolerance = 1e-4
-        options.ba_local_max_num_iterations = 12
-        options.ba_global_max_refinements = 2
-        options.ba_global_function_tolerance = 1e-4
-        options.ba_global_max_num_iterations = 15
+        options.ba_local_function_tolerance = self.convergence.local_tolerance
+        options.ba_local_max_num_iterations = self.convergence.local_iterations
+        options.ba_global_function_tolerance = self.convergence.global_tolerance
+        options.ba_global_max_num_iterations = self.convergence.global_iterations
+        options.ba_global_max_refinements = self.convergence.global_refinements
         return options
 
 
@@ -130,7 +162,7 @@ class Model:
         self._streaming = options.streaming()
         self._mapping = self._streaming.get_mapper()
         self._triangulation = self._streaming.get_triangulation()
-        self._local = LocalRefinement(self._streaming)
+        self._local = LocalRefinement(self._streaming, options.local_refinement)
         self._schedule = RefinementSchedule(options.schedule)
         self._seen_at_failure: dict[int, int] = {}
         self._mapper, self.reconstruction = view_graph.new_mapper()
@@ -229,13 +261,7 @@ class Model:
         """Refine a last time. The model cannot grow any more after this."""
         self.refine()
         self.reconstruction = final_adjustment(
-            self.reconstruction,
-            RobustAdjustmentOptions(
-                refine_intrinsics=self._options.refine_intrinsics,
-                num_threads=self._options.num_threads,
-                large_from=self._options.schedule.large_from,
-            ),
-            self._options.calibration,
+            self.reconstruction, self._options.robust, self._options.calibration
         )
         if not self.is_miscalibrated:
             for image_id in impossible_photos(self.reconstruction, self._mapping):

@@ -9,13 +9,6 @@ from sfm_front.errors import ConfigError
 # Photos from which a model is refined globally less often, and its last adjustments converge
 # longer: long flights unbend slowly, small models gain nothing (TUNING: large-growth).
 LARGE = 100
-# Keeps the cost per photo constant (TUNING: local-batch).
-_PHOTOS_PER_BATCH = 250
-
-
-def local_refinement_batch(num_images: int) -> int:
-    """Number of new photos that share a local refinement in a model of this size."""
-    return 1 + num_images // _PHOTOS_PER_BATCH
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +21,9 @@ class ScheduleOptions:
     """
 
     growth: float = 1.25
-    # The factor from ``large_from`` photos on.
+    # The factor from ``large_from`` photos on (TUNING: large-growth).
     large_growth: float = 1.6
+    # Photos from which a model counts as large.
     large_from: int = LARGE
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from sfm_front.cli.config_file import SET_AT_THE_TOP, as_toml, read_options
+from sfm_front.cli.config_file import TAKEN_FROM, as_toml, read_options
 from sfm_front.cli.main import main
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.mapping.initialization import ConstraintLevel, InitializationOptions
@@ -112,7 +112,7 @@ def test_all_is_printed_but_what_is_set_at_the_top():
         found = printed
         for part in filter(None, table.split(".")):
             found = found[part]
-        assert (key in found) == (value is not None and name not in SET_AT_THE_TOP), name
+        assert (key in found) == (value is not None and name not in TAKEN_FROM), name
     assert "# weights: not set" in as_toml(DEFAULT).splitlines()
 
 
@@ -120,7 +120,7 @@ def test_what_is_set_at_the_top_is_what_the_session_sets_itself():
     for name, change in {"seed": {"seed": 7}, "threads": {"threads": DEFAULT.threads + 1}}.items():
         before, after = leaves(DEFAULT), leaves(SessionOptions(**change))
         changed = {key for key in before if before[key] != after[key]} - {name}
-        assert changed == {key for key, top in SET_AT_THE_TOP.items() if top == name}
+        assert changed == {key for key, top in TAKEN_FROM.items() if top == name}
 
 
 def test_whatever_may_be_unset_is_so_where_a_file_leaves_it_out():
@@ -176,8 +176,8 @@ GOOD_LEVEL = f"{LEVEL}constraints = {{min_angle_deg = 1, min_inliers = 9}}\n"
             "atlas.initialization.constraint_levels#2.min_wait: no such key; did you mean "
             "atlas.initialization.constraint_levels#2.min_waiting?",
         ),
-        ("[verification]\nseed = 1", "verification.seed: set seed at the top of the file instead"),
-        ("[atlas.mapper]\nnum_threads = 1", "atlas.mapper.num_threads: set threads at the top"),
+        ("[verification]\nseed = 1", "verification.seed: set seed instead"),
+        ("[atlas.mapper]\nnum_threads = 1", "atlas.mapper.num_threads: set threads instead"),
         ("max_features = 1.0", "max_features: must be an integer, got 1.0"),
         ("max_features = true", "max_features: must be an integer, got true"),
         ("max_features = 9223372036854775808", "max_features: must be an integer, got 92"),

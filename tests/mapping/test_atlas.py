@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers.photo_stream import SceneFeed, position_errors_m, registered_names, true_pair
 
+from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import (
     DropReason,
@@ -22,6 +23,7 @@ from sfm_front.events import (
 )
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
 from sfm_front.mapping.finishing import finish
+from sfm_front.mapping.initialization import InitializationOptions
 from sfm_front.mapping.model import MapperOptions, Model
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry
@@ -267,3 +269,27 @@ def test_the_cost_of_global_refinement_stays_amortised(orbit, monkeypatch):
     assert atlas.models[0].num_registered == NUM_PHOTOS
     # Photos and points each have their series.
     assert sum(sizes) <= 2 * NUM_PHOTOS * growth / (growth - 1)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"min_second_model": 1},
+        {"min_model_size": 1},
+        {"max_missed_share": 1.1},
+        {"min_share": -0.1},
+        {"fresh_starts": -1},
+        {"max_failures": -1},
+    ],
+)
+def test_values_out_of_range_are_refused_by_name(wrong):
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        AtlasOptions(**wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"angle_tolerance": 1.5}, {"max_trials": 0}, {"max_last_trials": 0}]
+)
+def test_initialization_out_of_range_is_refused_by_name(wrong):
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        InitializationOptions(**wrong)

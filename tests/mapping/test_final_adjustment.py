@@ -8,6 +8,7 @@ import numpy as np
 import pycolmap
 import pytest
 
+from sfm_front.errors import ConfigError
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
 from sfm_front.mapping.final_adjustment import final_adjustment
 
@@ -93,6 +94,30 @@ def test_a_model_without_points_stays_as_it_is():
     polished = final_adjustment(model, RobustAdjustmentOptions())
     assert principal_point(polished) == [WIDTH / 2, HEIGHT / 2]
     assert polished.num_reg_images() == 10
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"loss_scale_px": 0}, {"tolerance": -1}, {"large_tolerance": -1}]
+)
+def test_values_out_of_range_are_refused_by_name(wrong):
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        RobustAdjustmentOptions(**wrong)
+
+
+def test_a_large_model_is_adjusted_longer():
+    """With a tolerance that lets it stop at once, a wrong focal length stays."""
+    model = centred(truth((WIDTH / 2, HEIGHT / 2)))
+    camera = model.camera(next(iter(model.cameras)))
+    camera.params = [1.02 * FOCAL_PX, *camera.params[1:]]
+
+    def focal_error_px(large_from: int) -> float:
+        options = RobustAdjustmentOptions(
+            tolerance=0.9, large_tolerance=1e-6, large_from=large_from
+        )
+        polished = final_adjustment(copy.deepcopy(model), options)
+        return abs(polished.camera(next(iter(polished.cameras))).mean_focal_length() - FOCAL_PX)
+
+    assert focal_error_px(large_from=10) < 0.5 * focal_error_px(large_from=11)
 
 
 def test_wrong_matches_weigh_less_than_in_least_squares():

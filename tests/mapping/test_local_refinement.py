@@ -8,10 +8,10 @@ import pycolmap
 import pytest
 from helpers.photo_stream import SceneFeed
 
+from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
 from sfm_front.evaluation.synthetic.scene import make_scene
-from sfm_front.mapping import local_refinement
-from sfm_front.mapping.local_refinement import LocalRefinement
+from sfm_front.mapping.local_refinement import LocalRefinement, LocalRefinementOptions
 from sfm_front.mapping.model import MapperOptions
 
 NUM_PHOTOS = 8
@@ -64,7 +64,7 @@ def test_around_one_photo_it_is_what_colmap_does():
 
 
 def test_photos_of_a_large_model_share_an_adjustment(monkeypatch):
-    monkeypatch.setattr(local_refinement, "local_refinement_batch", lambda _: 3)
+    monkeypatch.setattr(LocalRefinementOptions, "batch_size", lambda *_: 3)
     adjusted: list[int] = []
     ours = LocalRefinement(OPTIONS)
 
@@ -81,7 +81,7 @@ def test_photos_of_a_large_model_share_an_adjustment(monkeypatch):
 
 
 def test_what_was_refined_with_the_whole_model_is_forgotten(monkeypatch):
-    monkeypatch.setattr(local_refinement, "local_refinement_batch", lambda _: 2)
+    monkeypatch.setattr(LocalRefinementOptions, "batch_size", lambda *_: 2)
     ours = LocalRefinement(OPTIONS)
     waiting: list[bool] = []
 
@@ -93,3 +93,25 @@ def test_what_was_refined_with_the_whole_model_is_forgotten(monkeypatch):
 
     grown(add)
     assert waiting == [False, True, False, True, False, True]
+
+
+def test_the_larger_a_model_the_more_photos_share_an_adjustment():
+    batch_size = LocalRefinementOptions(photos_per_batch=250).batch_size
+    assert {batch_size(size) for size in range(2, 250)} == {1}
+    assert batch_size(250) == 2
+    # Each checks the whole model: for a photo, that stays below the check of 250 photos.
+    assert all(size / batch_size(size) <= 250 for size in range(2, 10_000, 7))
+
+
+def test_points_in_more_photos_than_the_limit_stay_fixed():
+    point = pycolmap.Point3D(track=pycolmap.Track([pycolmap.TrackElement(i, 0) for i in range(5)]))
+    point.error = 0.5
+    for limit, moves in ((4, False), (5, True)):
+        options = LocalRefinementOptions(max_track_length=limit)
+        assert LocalRefinement(OPTIONS, options)._is_short(point) is moves
+
+
+@pytest.mark.parametrize("name", ["photos_per_batch", "max_track_length"])
+def test_numbers_below_one_are_refused(name):
+    with pytest.raises(ConfigError, match=f"{name} must be at least 1, got 0"):
+        LocalRefinementOptions(**{name: 0})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,13 @@ from helpers.photo_stream import SceneFeed, position_errors_m
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.mapping.model import InitialPairConstraints, MapperOptions, Model
+from sfm_front.mapping.model import (
+    ConvergenceOptions,
+    InitialPairConstraints,
+    MapperOptions,
+    Model,
+)
+from sfm_front.mapping.refinement_schedule import ScheduleOptions
 
 DEMANDS = InitialPairConstraints(min_angle_deg=10, min_inliers=50)
 # The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
@@ -208,6 +214,41 @@ def test_a_model_is_the_same_to_the_bit_with_one_thread(orbit):
         model.refine()
         poses.append([model.reconstruction.images[i].cam_from_world().matrix() for i in ids])
     np.testing.assert_array_equal(poses[0], poses[1])
+
+
+def test_the_options_reach_pycolmap():
+    convergence = ConvergenceOptions(
+        local_tolerance=1e-3,
+        local_iterations=7,
+        global_tolerance=1e-2,
+        global_iterations=9,
+        global_refinements=4,
+        final_tolerance=1e-7,
+        large_final_tolerance=1e-8,
+    )
+    options = MapperOptions(
+        convergence=convergence,
+        schedule=ScheduleOptions(large_from=50),
+        num_threads=3,
+        refine_intrinsics=False,
+    )
+    streaming = options.streaming()
+    local = streaming.get_local_bundle_adjustment().ceres.solver_options
+    assert (local.function_tolerance, local.max_num_iterations) == (1e-3, 7)
+    whole = streaming.get_global_bundle_adjustment().ceres.solver_options
+    assert (whole.function_tolerance, whole.max_num_iterations) == (1e-2, 9)
+    assert streaming.ba_global_max_refinements == 4
+    final, large = (options.final(count).get_global_bundle_adjustment() for count in (49, 50))
+    assert final.ceres.solver_options.function_tolerance == 1e-7
+    assert large.ceres.solver_options.function_tolerance == 1e-8
+    robust = options.robust
+    assert (robust.num_threads, robust.refine_intrinsics, robust.large_from) == (3, False, 50)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(ConvergenceOptions)])
+def test_convergence_out_of_range_is_refused_by_name(name):
+    with pytest.raises(ConfigError, match=f"^{name} must be at least"):
+        ConvergenceOptions(**{name: -1})
 
 
 @pytest.mark.parametrize("wrong", [{"retry_growth": 0.9}, {"num_threads": 0}])

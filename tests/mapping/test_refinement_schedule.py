@@ -10,7 +10,6 @@ from sfm_front.errors import ConfigError
 from sfm_front.mapping.refinement_schedule import (
     RefinementSchedule,
     ScheduleOptions,
-    local_refinement_batch,
 )
 
 
@@ -77,10 +76,3 @@ def test_growth_in_points_alone_is_enough():
 def test_without_growth_there_is_no_schedule(name):
     with pytest.raises(ConfigError, match=f"{name} must be above 1, got 1"):
         ScheduleOptions(**{name: 1.0})
-
-
-def test_the_larger_a_model_the_more_photos_share_a_local_refinement():
-    assert {local_refinement_batch(size) for size in range(2, 250)} == {1}
-    assert local_refinement_batch(250) == 2
-    # Each checks the whole model: for a photo, that stays below the check of 250 photos.
-    assert all(size / local_refinement_batch(size) <= 250 for size in range(2, 10_000, 7))
