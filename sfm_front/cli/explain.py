@@ -16,7 +16,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--draw",
         type=Path,
         metavar="FILE.png",
-        help="picture of the verified matches with its first verified candidate; needs --photos",
+        help="picture of the matches with its first verified candidate, inliers in colour; "
+        "needs --photos",
     )
     parser.add_argument(
         "--photos", type=Path, metavar="FOLDER", help="the folder that was reconstructed"
@@ -48,17 +49,25 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _draw(output: Path, photos: Path, name1: str, name2: str, file: Path) -> None:
-    from sfm_front.reports.explanation import verified_matches
+    from sfm_front.reports.explanation import pair_matches
     from sfm_front.viewers.match_drawing import draw_matches
     from sfm_front.viewers.pictures import save
 
     for name in (name1, name2):
         if not (photos / name).is_file():
             raise InputError(f"{photos / name}: no such photo. Give the folder with --photos.")
-    matches = verified_matches(output, name1, name2)
-    caption = f"{name1}, {name2}: {len(matches.xy1)} verified matches"
+    matches = pair_matches(output, name1, name2)
+    count = int(matches.is_inlier.sum())
+    verdict = "verified" if matches.verified else "not verified, so matched again"
+    caption = f"{name1}, {name2}: {count} of {len(matches.xy1)} matches are inliers ({verdict})"
     picture = draw_matches(
-        photos / name1, photos / name2, matches.xy1, matches.xy2, matches.sizes, caption
+        photos / name1,
+        photos / name2,
+        matches.xy1,
+        matches.xy2,
+        matches.sizes,
+        caption,
+        matches.is_inlier,
     )
     save(picture, file)
     print(f"wrote {file}")

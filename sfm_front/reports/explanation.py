@@ -9,13 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
+from numpy.typing import NDArray
 
 from sfm_front.errors import InputError
+from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors
+from sfm_front.matching.verification import Verifier
 from sfm_front.reports.report_json import read_report
 from sfm_front.reports.retrieval_log import read_candidates
 from sfm_front.reports.run_summary import Outcome, RunSummary
 from sfm_front.storage.colmap_models import read_model
-from sfm_front.types import CandidateOutcome, Float64Array, Skipped
+from sfm_front.types import CandidateOutcome, Features, Float64Array, Skipped, Uint32Array, View
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +80,18 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairMatches:
-    """Verified matches of two photos: ``xy1``, ``xy2`` (M, 2) in pixels of the files, whose
-    ``sizes`` are (width, height)."""
+    """Tentative matches of two photos: ``xy1``, ``xy2`` (M, 2) in pixels of the files, whose
+    ``sizes`` are (width, height); ``is_inlier`` (M,).
+
+    ``verified``: whether they are those of a verified pair, or were matched again with default
+    options, because nothing is kept of rejected pairs.
+    """
 
     xy1: Float64Array
     xy2: Float64Array
+    is_inlier: NDArray[np.bool_]
     sizes: tuple[tuple[int, int], tuple[int, int]]
+    verified: bool
 
 
 def explain(output: Path, name: str) -> Explanation:
@@ -119,28 +128,46 @@ def explain(output: Path, name: str) -> Explanation:
     )
 
 
-def verified_matches(output: Path, name1: str, name2: str) -> PairMatches:
-    """The inliers of two photos' two-view geometry; none if they have no verified pair.
+def pair_matches(output: Path, name1: str, name2: str) -> PairMatches:
+    """Tentative matches of two photos and which of them are inliers.
 
     Raises InputError if the database lacks one of the photos.
     """
     with pycolmap.Database.open(output / "database.db") as database:
-        ids = {image.name: image for image in database.read_all_images()}
+        images = {image.name: image for image in database.read_all_images()}
         for name in (name1, name2):
-            if name not in ids:
+            if name not in images:
                 raise InputError(f"{output}: {name} is not in its database: nothing to draw")
-        images = ids[name1], ids[name2]
-        id1, id2 = (image.image_id for image in images)
-        matches = np.zeros((0, 2), np.uint32)
-        if database.exists_two_view_geometry(id1, id2):
-            matches = np.asarray(database.read_two_view_geometry(id1, id2).inlier_matches)
-        xy1, xy2 = (
-            np.asarray(database.read_keypoints(image_id), np.float64)[matches[:, side], :2]
-            for side, image_id in enumerate((id1, id2))
-        )
-        camera1, camera2 = (database.read_camera(image.camera_id) for image in images)
-    sizes = ((camera1.width, camera1.height), (camera2.width, camera2.height))
-    return PairMatches(xy1, xy2, sizes)
+        view1, view2 = (_view(database, images[name]) for name in (name1, name2))
+        ids = view1.image_id, view2.image_id
+        verified = bool(database.exists_two_view_geometry(*ids))
+        if verified:
+            matches = np.asarray(database.read_matches(*ids))
+            inliers = np.asarray(database.read_two_view_geometry(*ids).inlier_matches)
+        else:
+            descriptors = view1.features.descriptors, view2.features.descriptors
+            matches = match_descriptors(*descriptors, MatchingOptions())
+            inliers = Verifier().inliers(view1, view2, matches)
+    return PairMatches(
+        view1.points(matches[:, 0]),
+        view2.points(matches[:, 1]),
+        _among(matches, inliers),
+        ((view1.camera.width, view1.camera.height), (view2.camera.width, view2.camera.height)),
+        verified,
+    )
+
+
+def _view(database: pycolmap.Database, image: pycolmap.Image) -> View:
+    keypoints = np.asarray(database.read_keypoints(image.image_id), np.float32)
+    descriptors = np.asarray(database.read_descriptors(image.image_id).data, np.uint8)
+    colors = np.zeros((len(keypoints), 3), np.uint8)  # the database has none
+    camera = database.read_camera(image.camera_id)
+    return View(image.image_id, camera, Features(keypoints, descriptors, colors))
+
+
+def _among(matches: Uint32Array, inliers: Uint32Array) -> NDArray[np.bool_]:
+    found = {(first, second) for first, second in inliers.tolist()}
+    return np.array([tuple(match) in found for match in matches.tolist()], np.bool_)
 
 
 def _verdict(candidate: CandidateVerdict) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from sfm_front.types import Float64Array, Uint8Array
@@ -26,6 +27,7 @@ MOST_LINES = 200
 
 # Points are drawn to a fraction of a pixel: OpenCV takes fixed-point numbers.
 _SHIFT_BITS = 4
+_OUTLIER = (150, 150, 150)
 
 
 def draw_matches(
@@ -35,14 +37,17 @@ def draw_matches(
     xy2: Float64Array,
     sizes: tuple[tuple[int, int], tuple[int, int]],
     caption: str,
+    is_inlier: NDArray[np.bool_] | None = None,
 ) -> Image.Image:
     """``xy1``, ``xy2`` (M, 2): where each match is, in pixels of files of these (width, height).
 
     Every match has a circle in both photos, and a line where there are ``MOST_LINES`` or fewer;
     else an even share of them, from top to bottom, has lines, and the caption says so. Lines are
     coloured by the height of their left end, so that neighbours can be told from those that cross
-    them.
+    them. With ``is_inlier`` (M,), the others are thin grey lines beneath, an even share of them.
     """
+    if is_inlier is None:
+        is_inlier = np.ones(len(xy1), np.bool_)
     photos = [_fitted(path) for path in (path1, path2)]
     offsets = [(_MARGIN, _CAPTION), (_MARGIN + photos[0].width + _GAP, _CAPTION)]
     width = offsets[1][0] + photos[1].width + _MARGIN
@@ -55,8 +60,9 @@ def draw_matches(
         xy * (photo.width / size[0], photo.height / size[1]) + offset - 0.5
         for xy, photo, size, offset in zip((xy1, xy2), photos, sizes, offsets, strict=True)
     ]
-    drawn = Image.fromarray(_with_lines(np.array(canvas), ends[0], ends[1]))
-    if len(xy1) > MOST_LINES:
+    pixels = _with_outliers(np.array(canvas), *(xy[~is_inlier] for xy in ends))
+    drawn = Image.fromarray(_with_lines(pixels, *(xy[is_inlier] for xy in ends)))
+    if np.count_nonzero(is_inlier) > MOST_LINES:
         caption += f" ({MOST_LINES} drawn as lines)"
     write(
         drawn,
@@ -79,12 +85,10 @@ def _fitted(path: Path) -> Image.Image:
 
 def _with_lines(pixels: Uint8Array, starts: Float64Array, ends: Float64Array) -> Uint8Array:
     lines = pixels.copy()
-    top_down = np.argsort(starts[:, 1], kind="stable")
-    starts, ends = starts[top_down], ends[top_down]
-    fixed = [np.rint(xy * 2**_SHIFT_BITS).astype(int) for xy in (starts, ends)]
+    starts, ends = _top_down(starts, ends)
+    fixed = [_fixed_point(xy) for xy in (starts, ends)]
     colors = [_color(y / len(pixels)) for y in starts[:, 1]]
-    count = min(MOST_LINES, len(starts))
-    for i in np.linspace(0, len(starts) - 1, count).round().astype(int):
+    for i in _even_share(len(starts)):
         start, end = (xy[i].tolist() for xy in fixed)
         cv2.line(lines, start, end, colors[i], 1, cv2.LINE_AA, _SHIFT_BITS)
     blended = cv2.addWeighted(lines, _LINE_OPACITY, pixels, 1 - _LINE_OPACITY, 0)
@@ -93,6 +97,29 @@ def _with_lines(pixels: Uint8Array, starts: Float64Array, ends: Float64Array) ->
             radius = 3 * 2**_SHIFT_BITS
             cv2.circle(blended, point.tolist(), radius, color, 1, cv2.LINE_AA, _SHIFT_BITS)
     return np.asarray(blended, np.uint8)
+
+
+def _with_outliers(pixels: Uint8Array, starts: Float64Array, ends: Float64Array) -> Uint8Array:
+    lines = pixels.copy()
+    starts, ends = _top_down(starts, ends)
+    for i in _even_share(len(starts)):
+        start, end = (_fixed_point(xy[i]).tolist() for xy in (starts, ends))
+        cv2.line(lines, start, end, _OUTLIER, 1, cv2.LINE_AA, _SHIFT_BITS)
+    return np.asarray(cv2.addWeighted(lines, 0.5, pixels, 0.5, 0), np.uint8)
+
+
+def _top_down(starts: Float64Array, ends: Float64Array) -> tuple[Float64Array, Float64Array]:
+    order = np.argsort(starts[:, 1], kind="stable")
+    return starts[order], ends[order]
+
+
+def _fixed_point(xy: Float64Array) -> NDArray[np.int64]:
+    return np.asarray(np.rint(xy * 2**_SHIFT_BITS), np.int64)
+
+
+def _even_share(count: int) -> NDArray[np.int64]:
+    """Indices of at most ``MOST_LINES``."""
+    return np.asarray(np.linspace(0, count - 1, min(MOST_LINES, count)).round(), np.int64)
 
 
 def _color(share: float) -> tuple[int, int, int]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 
 import numpy as np
+import pycolmap
 import pytest
 from helpers.locations import VILLAGE
 from PIL import Image
 
 from sfm_front.cli.main import main
+from sfm_front.reports.explanation import pair_matches
 
 NAMES = ("0001.jpg", "0002.jpg", "0003.jpg", "0010.jpg", "0011.jpg")
 
@@ -64,6 +66,32 @@ def test_matches_are_drawn(output, folder, tmp_path, capsys):
     assert f"wrote {file}" in capsys.readouterr().out
     with Image.open(file) as picture:
         assert picture.width > 1000
+
+
+def test_tentative_matches_of_a_verified_pair_are_those_of_the_database(output):
+    matches = pair_matches(output, "0002.jpg", "0001.jpg")
+    assert matches.verified
+    assert 15 <= matches.is_inlier.sum() <= len(matches.is_inlier) == len(matches.xy1)
+    with pycolmap.Database.open(output / "database.db") as database:
+        ids = [database.read_image_with_name(name).image_id for name in ("0002.jpg", "0001.jpg")]
+        assert len(database.read_matches(*ids)) == len(matches.xy1)
+        inliers = database.read_two_view_geometry(*ids).inlier_matches
+    assert len(inliers) == matches.is_inlier.sum()
+
+
+def test_a_rejected_pair_is_matched_again(output, tmp_path):
+    """The copy of the output has lost the pair, as if it had been rejected."""
+    copy = tmp_path / "out"
+    shutil.copytree(output, copy)
+    kept = pair_matches(output, "0002.jpg", "0001.jpg")
+    with pycolmap.Database.open(copy / "database.db") as database:
+        ids = [database.read_image_with_name(name).image_id for name in ("0002.jpg", "0001.jpg")]
+        database.delete_two_view_geometry(*ids)
+        database.delete_matches(*ids)
+    again = pair_matches(copy, "0002.jpg", "0001.jpg")
+    assert not again.verified
+    assert again.is_inlier.sum() == pytest.approx(kept.is_inlier.sum(), rel=0.2)
+    assert len(again.xy1) > again.is_inlier.sum()
 
 
 @pytest.mark.parametrize(

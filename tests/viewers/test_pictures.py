@@ -126,11 +126,29 @@ def test_any_name_is_written_within_its_width(text, monkeypatch):
 SIZES = ((400, 300), (300, 400))
 
 
-def drawn(plain, xy1: list[list[float]], xy2: list[list[float]]) -> np.ndarray:
+def drawn(
+    plain, xy1: list[list[float]], xy2: list[list[float]], is_inlier: list[bool] | None = None
+) -> np.ndarray:
     black, white = plain("0.png", (0, 0, 0)), plain("1.png", (255, 255, 255), (300, 400))
     shape = -1, 2
     points = np.array(xy1, float).reshape(shape), np.array(xy2, float).reshape(shape)
-    return np.asarray(draw_matches(black, white, *points, SIZES, "caption"))
+    inlier = None if is_inlier is None else np.array(is_inlier)
+    return np.asarray(draw_matches(black, white, *points, SIZES, "caption", inlier))
+
+
+def test_outliers_are_grey_and_inliers_coloured(plain):
+    ends = [[200, 50], [200, 250]], [[150, 50], [150, 350]]
+    pixels = drawn(plain, *ends, [True, False]).astype(int)
+    left_photo = pixels[:, match_drawing._MARGIN + 5 : pixels.shape[1] // 3]
+    middle = len(pixels) // 2
+    upper, lower = left_photo[match_drawing._CAPTION + 5 : middle], left_photo[middle:-30]
+
+    def colourfulness(part: np.ndarray) -> int:
+        return int((part.max(axis=2) - part.min(axis=2)).max())
+
+    assert colourfulness(upper) > 50
+    assert lower.max() > 50
+    assert colourfulness(lower) == 0
 
 
 def test_a_line_runs_from_point_to_point(plain):
