@@ -19,3 +19,7 @@ class WeightsError(SfmFrontError):
 
 class DependencyError(SfmFrontError):
     """A library that this command needs cannot be loaded on this machine."""
+
+
+class StorageError(SfmFrontError):
+    """A session's files cannot be read or written: disk full, damaged, locked, gone."""

@@ -239,6 +239,47 @@ class CandidateOutcome:
     rejected: Rejected | None
 
 
+@dataclass(frozen=True, slots=True)
+class FileState:
+    """A file, and by what a change of it is noticed; ``size`` in bytes, both None if it is gone."""
+
+    path: Path
+    size: int | None
+    mtime_ns: int | None
+
+    @classmethod
+    def of(cls, path: Path) -> FileState:
+        """Its state now."""
+        try:
+            status = path.stat()
+        except OSError:
+            return cls(path, None, None)
+        return cls(path, status.st_size, status.st_mtime_ns)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredPhoto:
+    """A photo that a session has stored, without its features: see ``ExtractedPhoto``."""
+
+    image_id: int
+    name: str
+    camera_id: int
+    file: FileState
+    width: int
+    height: int
+    digest: str
+    exif: Exif
+    global_vector: Float32Array
+    num_keypoints: int
+    candidates: tuple[CandidateOutcome, ...]
+    seconds: dict[str, float]
+
+    @property
+    def path(self) -> Path:
+        """Where the file was."""
+        return self.file.path
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelSummary:
     """A finished model and the folder it was written to."""

@@ -205,8 +205,10 @@ class Session(Closeable):
             poses_of=self._atlas.poses_of,
             clock=clock,
         )
+        unranked = candidates[len(ranked) :]
+        outcomes = self._outcomes([*ranked, *unranked], pairs, rejected)
         with clock.stage("store"):
-            self._database.write(image_id, photo, view.camera, pairs)
+            self._database.write(image_id, photo, view.camera, pairs, outcomes)
         with clock.stage("map"):
             keypoints = photo.features.keypoints
             self._view_graph.add(image_id, photo.name, view.camera, keypoints, pairs)
@@ -216,12 +218,11 @@ class Session(Closeable):
         # Apart from the rest of mapping: it alone depends on how many photos came before.
         refinements = [event for event in events if isinstance(event, ModelRefined)]
         clock.move("map", "refine", sum(event.seconds for event in refinements))
-        unranked = candidates[len(ranked) :]
         return PhotoAdded(
             name=photo.name,
             image_id=image_id,
             num_keypoints=len(photo.features),
-            candidates=self._outcomes([*ranked, *unranked], pairs, rejected),
+            candidates=outcomes,
             registered=tuple(self._catalog.name(i) for i in registered),
             num_registered=len(self._atlas.registered),
             num_points=self._atlas.num_points,

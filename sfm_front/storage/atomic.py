@@ -14,7 +14,8 @@ from sfm_front.errors import InputError
 def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let ``write`` fill a file beside ``path``, then put it in its place; folders are made.
 
-    A reader, or a process killed meanwhile, finds what was there before, or all of the new.
+    A reader, a process killed meanwhile, or a power cut leaves what was there before, or all of the
+    new.
     Raises InputError where the file cannot be written.
     """
     try:
@@ -24,11 +25,25 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         try:
             with os.fdopen(descriptor, "wb") as file:
                 write(file)
+                file.flush()
+                os.fsync(file.fileno())
             # mkstemp makes files that only their owner can read.
             partial.chmod(0o644)
             partial.replace(path)
+            sync(path.parent)
         finally:
             partial.unlink(missing_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"{path}: cannot be written ({reason}). Give another place.") from error
+
+
+def sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk. Raises OSError."""
+    if os.name == "nt" and path.is_dir():
+        return  # Windows has no such call for folders, and needs none.
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,27 +1,105 @@
-"""The COLMAP database of a session."""
+"""The COLMAP database of a session, which also holds what a session needs to go on."""
 
 from __future__ import annotations
 
+import json
+import logging
+import os
 import sqlite3
-from collections.abc import Sequence
-from contextlib import closing
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
+from threading import RLock
+from typing import Any
 
 import numpy as np
 import pycolmap
 
-from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
+from sfm_front.errors import StorageError
 from sfm_front.runtime.closeable import Closeable
-from sfm_front.types import ExtractedPhoto, GeoPosition, PairGeometry
+from sfm_front.storage.atomic import sync
+from sfm_front.storage.colmap_rows import (
+    PAIR_COLUMNS,
+    Row,
+    camera_rows,
+    pair_rows,
+    photo_rows,
+    read_camera,
+    read_pair,
+)
+from sfm_front.types import (
+    CandidateOutcome,
+    Exif,
+    ExtractedPhoto,
+    Features,
+    FileState,
+    GeoPosition,
+    PairGeometry,
+    Rejected,
+    Rejection,
+    Skipped,
+    SkipReason,
+    StoredPhoto,
+    Uint8Array,
+)
+
+logger = logging.getLogger(__name__)
+
+# Tables beside COLMAP's, which its tools pass over.
+_TABLES = """
+CREATE TABLE IF NOT EXISTS sfm_front_session (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS sfm_front_photos (
+    image_id INTEGER PRIMARY KEY NOT NULL, path BLOB NOT NULL, size INTEGER, mtime_ns INTEGER,
+    width INTEGER NOT NULL, height INTEGER NOT NULL, digest TEXT NOT NULL, exif TEXT NOT NULL,
+    global_vector BLOB NOT NULL, colors BLOB NOT NULL, candidates TEXT NOT NULL,
+    seconds TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS sfm_front_skipped (
+    name TEXT PRIMARY KEY NOT NULL, path BLOB NOT NULL, size INTEGER, mtime_ns INTEGER,
+    reason TEXT NOT NULL, detail TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS sfm_front_pairs (
+    number INTEGER PRIMARY KEY, later INTEGER NOT NULL, earlier INTEGER NOT NULL, tri_angle REAL);
+CREATE INDEX IF NOT EXISTS sfm_front_pairs_by_photo ON sfm_front_pairs (later);
+"""
+
+_LOCK_PATIENCE_S = 600.0
+_LOCK_POLL_S = 1.0
 
 
 class PhotoDatabase(Closeable):
-    """Writes photos to a COLMAP database that COLMAP's own tools can go on with."""
+    """Writes photos to a COLMAP database that COLMAP's own tools can go on with.
+
+    Each photo is one transaction: all of it is there, or nothing. When a write returns, it is on
+    the disk and survives a power cut. Raises StorageError if the file cannot be used: disk full,
+    damaged, locked by another program for ten minutes. Safe to read from several threads.
+
+    Other processes may read the file meanwhile. In this process pycolmap must not open it before
+    this is closed: pycolmap brings an SQLite of its own, and two of them in one process do not see
+    each other's locks (sqlite.org/howtocorrupt.html).
+    """
 
     def __init__(self, path: Path) -> None:
         """Open the database at ``path``, or make it."""
         self._path = path
-        self._database = pycolmap.Database.open(path)
+        self._lock = RLock()
+        if not path.exists():
+            # COLMAP's tables are COLMAP's to define.
+            pycolmap.Database.open(path).close()
+            sync(path)
+            sync(path.parent)
+        with self._errors():
+            self._connection = sqlite3.connect(
+                path, timeout=_LOCK_POLL_S, isolation_level=None, check_same_thread=False
+            )
+            # A reader, or COLMAP's own tools, may look while a session writes.
+            self._execute("PRAGMA journal_mode=WAL")
+            # Each commit is on the disk before it returns.
+            self._execute("PRAGMA synchronous=FULL")
+            for statement in filter(str.strip, _TABLES.split(";")):
+                self._execute(statement)
+
+    # --- writing ---------------------------------------------------------------------------------
 
     def write(
         self,
@@ -29,75 +107,264 @@ class PhotoDatabase(Closeable):
         photo: ExtractedPhoto,
         camera: pycolmap.Camera,
         pairs: Sequence[PairGeometry],
+        candidates: Sequence[CandidateOutcome] = (),
     ) -> None:
         """Write a photo with all that is known of it, or nothing of it if this raises.
 
         Ids are those given: frames have their image's id, rigs their camera's.
         """
-        try:
-            self._write(image_id, photo, camera, pairs)
-        except BaseException:
-            # pycolmap's transaction commits even then; COLMAP's database knows no rollback.
-            _remove(self._path, image_id)
-            raise
-
-    def _write(
-        self,
-        image_id: int,
-        photo: ExtractedPhoto,
-        camera: pycolmap.Camera,
-        pairs: Sequence[PairGeometry],
-    ) -> None:
-        database = self._database
-        with pycolmap.DatabaseTransaction(database):
-            if not database.exists_camera(camera.camera_id):
-                database.write_camera(camera, use_camera_id=True)
-                database.write_rig(trivial_rig(camera), use_rig_id=True)
-            image = pycolmap.Image(name=photo.name, camera_id=camera.camera_id, image_id=image_id)
-            database.write_image(image, use_image_id=True)
-            database.write_frame(trivial_frame(image), use_frame_id=True)
-            database.write_keypoints(image_id, photo.features.keypoints)
-            database.write_descriptors(
-                image_id,
-                pycolmap.FeatureDescriptors(
-                    type=pycolmap.FeatureExtractorType.SIFT, data=photo.features.descriptors
-                ),
-            )
-            position = photo.exif.position
-            if position is not None and position.altitude_m is not None:
-                database.write_pose_prior(_pose_prior(image, position, position.altitude_m))
+        with self._transaction():
+            for row in camera_rows(camera):
+                self._insert(row)
+            for row in photo_rows(image_id, photo, camera.camera_id):
+                self._insert(row)
             for pair in pairs:
-                ids = pair.image_id1, pair.image_id2
-                database.write_matches(*ids, pair.matches)
-                database.write_two_view_geometry(*ids, pair.two_view_geometry)
+                for row in pair_rows(pair):
+                    self._insert(row)
+                # COLMAP's table has no place for the angle.
+                known = {
+                    "later": pair.image_id1,
+                    "earlier": pair.image_id2,
+                    "tri_angle": pair.two_view_geometry.tri_angle,
+                }
+                self._insert(Row("sfm_front_pairs", known))
+            self._insert(
+                Row(
+                    "sfm_front_photos",
+                    {
+                        "image_id": image_id,
+                        **_file(photo.path),
+                        "width": photo.width,
+                        "height": photo.height,
+                        "digest": photo.digest,
+                        "exif": _exif_text(photo.exif),
+                        "global_vector": photo.global_vector.tobytes(),
+                        "colors": photo.features.colors.tobytes(),
+                        "candidates": _candidates_text(candidates),
+                        "seconds": json.dumps(photo.seconds),
+                    },
+                )
+            )
+
+    def write_skipped(self, skipped: Skipped, path: Path) -> None:
+        """Remember a file that is not used; a file of that name is written over."""
+        with self._transaction():
+            self._execute(
+                "INSERT OR REPLACE INTO sfm_front_skipped VALUES (?, ?, ?, ?, ?, ?)",
+                (skipped.name, *_file(path).values(), skipped.reason.value, skipped.detail),
+            )
+
+    def remember(self, key: str, value: str) -> None:
+        """Keep a text about the session."""
+        with self._transaction():
+            self._execute("INSERT OR REPLACE INTO sfm_front_session VALUES (?, ?)", (key, value))
+
+    # --- reading ---------------------------------------------------------------------------------
+
+    def recall(self, key: str) -> str | None:
+        """A text that was kept; None if there is none."""
+        rows = self._rows("SELECT value FROM sfm_front_session WHERE key = ?", (key,))
+        return str(rows[0][0]) if rows else None
+
+    def photos(self) -> Iterator[StoredPhoto]:
+        """All photos, in order of arrival."""
+        for row in self._each(
+            "SELECT image_id, name, camera_id, path, size, mtime_ns, width, height, digest, exif, "
+            "global_vector, candidates, seconds, keypoints.rows FROM sfm_front_photos "
+            "JOIN images USING (image_id) JOIN keypoints USING (image_id) ORDER BY image_id"
+        ):
+            yield StoredPhoto(
+                image_id=row[0],
+                name=row[1],
+                camera_id=row[2],
+                file=FileState(Path(os.fsdecode(row[3])), row[4], row[5]),
+                width=row[6],
+                height=row[7],
+                digest=row[8],
+                exif=_exif(row[9]),
+                global_vector=np.frombuffer(row[10], np.float32),
+                candidates=_candidates(row[11]),
+                seconds=json.loads(row[12]),
+                num_keypoints=row[13],
+            )
+
+    def skipped(self) -> list[tuple[Skipped, FileState]]:
+        """Files that were not used, as they were then."""
+        rows = self._rows(
+            "SELECT name, path, size, mtime_ns, reason, detail FROM sfm_front_skipped"
+        )
+        return [
+            (
+                Skipped(name, SkipReason(reason), detail),
+                FileState(Path(os.fsdecode(path)), size, mtime_ns),
+            )
+            for name, path, size, mtime_ns, reason, detail in rows
+        ]
+
+    def features(self, image_id: int) -> Features:
+        """Features of a photo. Raises KeyError if there is no such photo."""
+        rows = self._rows(
+            "SELECT k.rows, k.cols, k.data, d.data, p.colors FROM keypoints k "
+            "JOIN descriptors d USING (image_id) JOIN sfm_front_photos p USING (image_id) "
+            "WHERE image_id = ?",
+            (image_id,),
+        )
+        if not rows:
+            raise KeyError(image_id)
+        num, cols, keypoints, descriptors, colors = rows[0]
+        return Features(
+            np.frombuffer(keypoints, np.float32).reshape(num, cols),
+            np.frombuffer(descriptors, np.uint8).reshape(num, -1),
+            np.frombuffer(colors, np.uint8).reshape(num, 3),
+        )
+
+    def colors(self, image_id: int) -> Uint8Array:
+        """(N, 3) uint8 RGB under each keypoint. Raises KeyError if there is no such photo."""
+        rows = self._rows("SELECT colors FROM sfm_front_photos WHERE image_id = ?", (image_id,))
+        if not rows:
+            raise KeyError(image_id)
+        return np.frombuffer(rows[0][0], np.uint8).reshape(-1, 3)
+
+    def cameras(self) -> dict[int, pycolmap.Camera]:
+        """Camera id → camera, as photos started with it."""
+        rows = self._rows(
+            "SELECT camera_id, model, width, height, params, prior_focal_length FROM cameras"
+        )
+        return {row[0]: read_camera(row) for row in rows}
+
+    def pairs(self, image_id: int) -> list[PairGeometry]:
+        """Verified pairs of a photo with earlier ones, as they were given to ``write``."""
+        return [
+            read_pair(image_id, earlier, self._pair_row(image_id, earlier), tri_angle)
+            for earlier, tri_angle in self._rows(
+                "SELECT earlier, tri_angle FROM sfm_front_pairs WHERE later = ? ORDER BY number",
+                (image_id,),
+            )
+        ]
+
+    def _pair_row(self, image_id1: int, image_id2: int) -> tuple[Any, ...]:
+        pair_id = pycolmap.image_pair_to_pair_id(image_id1, image_id2)
+        (row,) = self._rows(f"SELECT {PAIR_COLUMNS} WHERE pair_id = ?", (pair_id,))
+        return row
 
     def close(self) -> None:
-        self._database.close()
+        with self._lock, self._errors():
+            self._connection.close()
+
+    # --- SQL -------------------------------------------------------------------------------------
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with self._lock, self._errors():
+            self._begin()
+            try:
+                yield
+                self._execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:
+                    self._connection.execute("ROLLBACK")
+                raise
+
+    def _begin(self) -> None:
+        """Wait while another program writes, and say so."""
+        until = time.monotonic() + _LOCK_PATIENCE_S
+        waiting = False
+        while True:
+            try:
+                self._execute("BEGIN IMMEDIATE")
+                return
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error) or time.monotonic() > until:
+                    raise
+                if not waiting:
+                    logger.warning("%s: locked by another program, waiting for it", self._path)
+                waiting = True
+
+    def _insert(self, row: Row) -> None:
+        names = ", ".join(row.values)
+        marks = ", ".join("?" * len(row.values))
+        either = "OR IGNORE " if row.once else ""
+        self._execute(
+            f"INSERT {either}INTO {row.table} ({names}) VALUES ({marks})",
+            tuple(row.values.values()),
+        )
+
+    def _each(self, statement: str) -> Iterator[tuple[Any, ...]]:
+        """Row by row: all of them may not fit into memory."""
+        with self._errors():
+            yield from self._connection.execute(statement)
+
+    def _rows(self, statement: str, values: Iterable[Any] = ()) -> list[tuple[Any, ...]]:
+        with self._lock, self._errors():
+            return self._connection.execute(statement, tuple(values)).fetchall()
+
+    def _execute(self, statement: str, values: Iterable[Any] = ()) -> None:
+        self._connection.execute(statement, tuple(values))
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise StorageError(f"{self._path}: {error}") from error
 
 
-def _remove(path: Path, image_id: int) -> None:
-    """Remove the rows of a photo and of its pairs. Its camera may stay: others can share it."""
-    with closing(sqlite3.connect(path)) as connection, connection:
-        others = [row[0] for row in connection.execute("SELECT image_id FROM images")]
-        pairs = [(pycolmap.image_pair_to_pair_id(image_id, other),) for other in others]
-        for table in ("matches", "two_view_geometries"):
-            connection.executemany(f"DELETE FROM {table} WHERE pair_id = ?", pairs)
-        for table in ("keypoints", "descriptors", "images"):
-            connection.execute(f"DELETE FROM {table} WHERE image_id = ?", (image_id,))
-        for table in ("frame_data", "frames"):
-            connection.execute(f"DELETE FROM {table} WHERE frame_id = ?", (image_id,))
-        connection.execute("DELETE FROM pose_priors WHERE corr_data_id = ?", (image_id,))
+def _file(path: Path) -> dict[str, Any]:
+    """Where a file is, and its state now; None if it is gone."""
+    state = FileState.of(path)
+    return {"path": os.fsencode(state.path), "size": state.size, "mtime_ns": state.mtime_ns}
 
 
-def _pose_prior(
-    image: pycolmap.Image, position: GeoPosition, altitude_m: float
-) -> pycolmap.PosePrior:
-    """COLMAP's WGS84 prior: latitude and longitude in degrees, altitude in metres.
+def _exif_text(exif: Exif) -> str:
+    position = exif.position
+    return json.dumps(
+        {
+            "make": exif.make,
+            "model": exif.model,
+            "focal_length_mm": exif.focal_length_mm,
+            "focal_length_35mm": exif.focal_length_35mm,
+            "captured_at": exif.captured_at and exif.captured_at.isoformat(),
+            "position": position
+            and [position.latitude_deg, position.longitude_deg, position.altitude_m],
+            "orientation": exif.orientation,
+        }
+    )
 
-    A position without altitude has none: COLMAP turns all priors into NaN if the first has one.
-    """
-    prior = pycolmap.PosePrior()
-    prior.corr_data_id = image.data_id
-    prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.WGS84
-    prior.position = np.array([position.latitude_deg, position.longitude_deg, altitude_m])
-    return prior
+
+def _exif(text: str) -> Exif:
+    content = json.loads(text)
+    captured_at, position = content["captured_at"], content["position"]
+    return Exif(
+        **{
+            **content,
+            "captured_at": captured_at and datetime.fromisoformat(captured_at),
+            "position": position and GeoPosition(*position),
+        }
+    )
+
+
+def _candidates_text(candidates: Sequence[CandidateOutcome]) -> str:
+    return json.dumps(
+        [
+            [
+                candidate.name,
+                candidate.cosine,
+                candidate.inliers,
+                candidate.verified,
+                (why := candidate.rejected)
+                and [why.reason.value, why.num_matches, why.num_inliers],
+            ]
+            for candidate in candidates
+        ]
+    )
+
+
+def _candidates(text: str) -> tuple[CandidateOutcome, ...]:
+    return tuple(
+        CandidateOutcome(name, cosine, inliers, verified, why and _rejected(*why))
+        for name, cosine, inliers, verified, why in json.loads(text)
+    )
+
+
+def _rejected(reason: str, num_matches: int | None, num_inliers: int) -> Rejected:
+    return Rejected(Rejection(reason), num_matches, num_inliers)

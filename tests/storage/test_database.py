@@ -6,8 +6,10 @@ import os
 import sqlite3
 import subprocess
 import sys
+import threading
 from contextlib import closing
 from dataclasses import replace
+from datetime import datetime
 
 import numpy as np
 import pycolmap
@@ -15,9 +17,20 @@ import pytest
 from helpers.locations import ROOT, TESTS
 from helpers.photo_stream import described, true_pair
 
+from sfm_front.errors import StorageError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
 from sfm_front.storage.database import PhotoDatabase
-from sfm_front.types import Exif, GeoPosition
+from sfm_front.types import (
+    CandidateOutcome,
+    Exif,
+    FileState,
+    GeoPosition,
+    Rejected,
+    Rejection,
+    Skipped,
+    SkipReason,
+)
 
 ROTATION_TOLERANCE = 1e-9
 
@@ -164,7 +177,9 @@ KILLED_WHILE_WRITING = """
 import os, sys
 from pathlib import Path
 from helpers.photo_stream import described, true_pair
+from sfm_front.errors import StorageError
 from sfm_front.evaluation.synthetic.scene import make_scene
+from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
 from sfm_front.storage.database import PhotoDatabase
 
 def pairs():
@@ -201,9 +216,160 @@ def test_a_killed_process_leaves_whole_photos(orbit, tmp_path):
         assert database.num_verified_image_pairs() == 1
 
 
-def test_a_photo_is_there_for_others_as_soon_as_it_is_written(orbit, tmp_path):
-    with PhotoDatabase(tmp_path / "database.db") as store:
+READ_BY_ANOTHER = """
+import sys, zlib, pycolmap
+with pycolmap.Database.open(sys.argv[1]) as database:
+    print(database.num_images())
+"""
+
+
+def test_a_photo_is_there_for_other_processes_as_soon_as_it_is_written(orbit, tmp_path):
+    file = tmp_path / "database.db"
+    with PhotoDatabase(file) as store:
         for image_id in (1, 2):
             store.write(image_id, described(orbit, image_id - 1), orbit.camera, [])
-            with pycolmap.Database.open(tmp_path / "database.db") as database:
-                assert database.num_images() == image_id
+            reader = [sys.executable, "-c", READ_BY_ANOTHER, str(file)]
+            read = subprocess.run(reader, capture_output=True, text=True, check=True)
+            assert int(read.stdout) == image_id
+    with pycolmap.Database.open(file) as database:
+        assert database.num_images() == 2
+
+
+def rows_of(file) -> dict[str, list[tuple[object, ...]]]:
+    tables = (*EACH_PHOTO, "cameras", "rigs", "pose_priors", "matches", "two_view_geometries")
+    with closing(sqlite3.connect(file)) as rows:
+        return {table: rows.execute(f"SELECT * FROM {table}").fetchall() for table in tables}
+
+
+def test_rows_are_those_that_pycolmap_writes(orbit, tmp_path):
+    """To the bit, in every table and column: COLMAP's format is COLMAP's to define."""
+    position = GeoPosition(47.5, -8.25, 512.0)
+    photos = [replace(described(orbit, index), exif=Exif(position=position)) for index in range(3)]
+    camera = orbit.camera
+    pairs = {2: [true_pair(orbit, 1, 0, (2, 1))], 3: [true_pair(orbit, 2, 1, (3, 2))]}
+    matrix = np.arange(9.0).reshape(3, 3) + np.eye(3)
+    pairs[3][0].two_view_geometry.F = pairs[3][0].two_view_geometry.H = matrix
+    with PhotoDatabase(tmp_path / "ours.db") as store:
+        for image_id, photo in enumerate(photos, 1):
+            store.write(image_id, photo, camera, pairs.get(image_id, []))
+    with pycolmap.Database.open(tmp_path / "theirs.db") as database:
+        database.write_camera(camera, use_camera_id=True)
+        database.write_rig(trivial_rig(camera), use_rig_id=True)
+        for image_id, photo in enumerate(photos, 1):
+            image = pycolmap.Image(name=photo.name, camera_id=1, image_id=image_id)
+            database.write_image(image, use_image_id=True)
+            database.write_frame(trivial_frame(image), use_frame_id=True)
+            database.write_keypoints(image_id, photo.features.keypoints)
+            descriptors = pycolmap.FeatureDescriptors(
+                type=pycolmap.FeatureExtractorType.SIFT, data=photo.features.descriptors
+            )
+            database.write_descriptors(image_id, descriptors)
+            prior = pycolmap.PosePrior()
+            prior.corr_data_id = image.data_id
+            prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.WGS84
+            prior.position = np.array([47.5, -8.25, 512.0])
+            database.write_pose_prior(prior)
+            for pair in pairs.get(image_id, []):
+                ids = pair.image_id1, pair.image_id2
+                database.write_matches(*ids, pair.matches)
+                database.write_two_view_geometry(*ids, pair.two_view_geometry)
+    assert rows_of(tmp_path / "ours.db") == rows_of(tmp_path / "theirs.db")
+
+
+def test_what_a_session_needs_is_read_back(orbit, tmp_path):
+    exif = Exif(
+        make="ä",
+        model="b",
+        focal_length_mm=24.0,
+        captured_at=datetime(2026, 5, 1, 12, 30, 1),
+        position=GeoPosition(1.0, 2.0, None),
+        orientation=6,
+    )
+    first = replace(described(orbit, 0), exif=exif, path=tmp_path / "a.jpg", seconds={"sift": 0.5})
+    first.path.write_bytes(b"photo")
+    second = described(orbit, 1)
+    pairs = [true_pair(orbit, 1, 0, (2, 1))]
+    why = Rejected(Rejection.TOO_FEW_INLIERS, None, 7)
+    candidates = (
+        CandidateOutcome("a.jpg", 0.25, 30, True, None),
+        CandidateOutcome("b.jpg", 0.125, None, False, why),
+    )
+    skipped = Skipped("torn.jpg", SkipReason.TRUNCATED, "half")
+    with PhotoDatabase(tmp_path / "database.db") as store:
+        store.write(1, first, orbit.camera, [])
+        store.write(2, second, orbit.camera, pairs, candidates)
+        store.write_skipped(skipped, tmp_path / "torn.jpg")
+        store.remember("options", "{}")
+    with PhotoDatabase(tmp_path / "database.db") as store:
+        one, two = store.photos()
+        assert (one.image_id, one.name, one.camera_id) == (1, first.name, 1)
+        assert (one.width, one.height, one.digest) == (first.width, first.height, first.digest)
+        assert one.exif == exif
+        assert one.seconds == {"sift": 0.5}
+        assert one.num_keypoints == len(first.features)
+        assert one.file == FileState.of(first.path)
+        assert one.file.size == 5
+        np.testing.assert_array_equal(one.global_vector, first.global_vector)
+        assert two.candidates == candidates
+        assert two.file.size is None  # a file that is gone
+        for image_id, photo in ((1, first), (2, second)):
+            features = store.features(image_id)
+            np.testing.assert_array_equal(features.keypoints, photo.features.keypoints)
+            np.testing.assert_array_equal(features.descriptors, photo.features.descriptors)
+            np.testing.assert_array_equal(features.colors, photo.features.colors)
+            np.testing.assert_array_equal(store.colors(image_id), photo.features.colors)
+        assert store.pairs(1) == []
+        (read,) = store.pairs(2)
+        written = pairs[0]
+        assert (read.image_id1, read.image_id2) == (2, 1)
+        np.testing.assert_array_equal(read.matches, written.matches)
+        geometry, expected = read.two_view_geometry, written.two_view_geometry
+        assert geometry.config == expected.config
+        assert geometry.tri_angle == expected.tri_angle
+        np.testing.assert_array_equal(geometry.inlier_matches, expected.inlier_matches)
+        np.testing.assert_allclose(geometry.E, expected.E, atol=ROTATION_TOLERANCE)
+        np.testing.assert_allclose(
+            geometry.cam2_from_cam1.matrix(),
+            expected.cam2_from_cam1.matrix(),
+            atol=ROTATION_TOLERANCE,
+        )
+        (camera,) = store.cameras().values()
+        np.testing.assert_array_equal(camera.params, orbit.camera.params)
+        assert store.skipped() == [(skipped, FileState.of(tmp_path / "torn.jpg"))]
+        assert (store.recall("options"), store.recall("none")) == ("{}", None)
+        with pytest.raises(KeyError):
+            store.features(3)
+
+
+def test_a_file_that_is_no_database_is_told_in_one_line(tmp_path):
+    (tmp_path / "database.db").write_bytes(b"no database" * 100)
+    with pytest.raises(StorageError, match=r"database\.db: file is not a database"):
+        PhotoDatabase(tmp_path / "database.db")
+
+
+def test_a_database_locked_for_a_while_is_waited_for(orbit, tmp_path, caplog):
+    file = tmp_path / "database.db"
+    with (
+        PhotoDatabase(file) as store,
+        closing(sqlite3.connect(file, timeout=0, check_same_thread=False)) as other,
+    ):
+        other.isolation_level = None
+        other.execute("BEGIN IMMEDIATE")
+        threading.Timer(1.5, other.execute, ["ROLLBACK"]).start()
+        store.write(1, described(orbit, 0), orbit.camera, [])
+        assert "locked by another program" in caplog.text
+        assert len(list(store.photos())) == 1
+
+
+def test_a_full_disk_is_told_and_leaves_nothing_of_the_photo(orbit, tmp_path):
+    file = tmp_path / "database.db"
+    with PhotoDatabase(file) as store:
+        store.write(1, described(orbit, 0), orbit.camera, [])
+        pages = store._connection.execute("PRAGMA page_count").fetchone()[0]
+        store._connection.execute(f"PRAGMA max_page_count={pages + 5}")
+        with pytest.raises(StorageError, match="full"):
+            store.write(2, described(orbit, 1), orbit.camera, [])
+        assert [photo.image_id for photo in store.photos()] == [1]
+        store._connection.execute("PRAGMA max_page_count=1000000")
+        store.write(2, described(orbit, 1), orbit.camera, [])
+        assert [photo.image_id for photo in store.photos()] == [1, 2]
