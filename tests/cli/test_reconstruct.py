@@ -53,11 +53,12 @@ class Run:
 
 
 def tables(database: Path) -> dict[str, list[tuple[object, ...]]]:
-    """The content of a database, table by table."""
+    """The content of a database, table by table; not how long each photo took."""
     with sqlite3.connect(database) as connection:
         names = [
             name
             for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type='table'")
+            if name != "sfm_front_photos"
         ]
         return {name: connection.execute(f'SELECT * FROM "{name}"').fetchall() for name in names}
 
