@@ -11,6 +11,8 @@ import zlib  # noqa: F401
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from sfm_front.version import VERSION
+
 if TYPE_CHECKING:
     from sfm_front.errors import (
         ConfigError,
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from sfm_front.session.session import Session, SessionResult
     from sfm_front.types import ModelSummary, PhotoPath, Skipped
 
-__version__ = "0.1.0"
+__version__ = VERSION
 __all__ = [
     "ConfigError",
     "DependencyError",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from sfm_front.types import CandidateOutcome, Skipped
 
@@ -60,12 +60,18 @@ class ModelDropped:
 
 @dataclass(frozen=True, slots=True)
 class ModelRefined:
-    """A whole model was refined, in ``seconds`` of wall time."""
+    """A whole model was refined, in ``seconds`` of wall time.
+
+    ``median_shift`` and ``max_shift``: how far the cameras of its photos moved, in the model's
+    units.
+    """
 
     model_id: int
     num_registered: int
     num_points: int
     seconds: float
+    median_shift: float = 0.0
+    max_shift: float = 0.0
 
     def __str__(self) -> str:
         return (
@@ -118,8 +124,65 @@ class PhotoAdded:
         return tuple(candidate.name for candidate in self.candidates if candidate.verified)
 
 
-Event: TypeAlias = Skipped | PhotoAdded | ModelEvent
-"""A photo was skipped or added, or something became of a model."""
+@dataclass(frozen=True, slots=True)
+class SessionStarted:
+    """A session begins, or goes on: ``num_photos`` of it are there already."""
+
+    version: str
+    options: dict[str, Any]
+    num_photos: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoArrived:
+    """A photo was noticed, and will be described."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoPlaced:
+    """A photo was registered in a model.
+
+    ``quaternion_xyzw`` and ``translation`` are those of cam_from_world; ``camera`` is COLMAP's
+    model with its ``params``, in pixels of the file. ``num_inliers``: points of the model that
+    the photo observes. ``latency_s``: from arrival, None for photos of an earlier run.
+    """
+
+    name: str
+    image_id: int
+    model_id: int
+    quaternion_xyzw: tuple[float, float, float, float]
+    translation: tuple[float, float, float]
+    camera: str
+    params: tuple[float, ...]
+    num_inliers: int
+    latency_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoWaiting:
+    """A photo was stored and fits no model yet, and why."""
+
+    name: str
+    image_id: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class SessionEnded:
+    """All models are written, or, if not ``finished``, those of the last snapshot stay."""
+
+    finished: bool
+    num_photos: int
+    num_registered: int
+    num_models: int
+
+
+PhotoEvent: TypeAlias = PhotoArrived | Skipped | PhotoAdded | PhotoPlaced | PhotoWaiting
+SessionEvent: TypeAlias = SessionStarted | SessionEnded
+Event: TypeAlias = PhotoEvent | ModelEvent | SessionEvent
+"""What a listener of a session hears of."""
 
 Emit: TypeAlias = Callable[[ModelEvent], None]
 Listener: TypeAlias = Callable[[Event], None]

@@ -28,7 +28,7 @@ FLOORS = (
     ("matching", "mapping", "storage"),
     ("runtime", "photos", "geometry"),
     ("events",),
-    ("types", "errors"),
+    ("types", "errors", "version"),
 )
 
 # (importing module, imported module) → why it may point up all the same.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,7 +11,16 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
+from sfm_front.errors import StorageError
+from sfm_front.storage.atomic import sync
+from sfm_front.storage.json_files import write_json
 from sfm_front.types import ModelSummary, Uint8Array
+
+STATE = "session.json"
+"""What a session knows beside its models, in their folder."""
+
+# Free space from which a model is taken to be whole without reading it back.
+_ROOM = 64 * 2**20
 
 
 def export_models(
@@ -18,26 +29,59 @@ def export_models(
     folder: Path,
     *,
     text: bool = False,
+    point_clouds: bool = True,
+    state: object | None = None,
 ) -> list[ModelSummary]:
     """Colour models and write them to ``folder/0``, ``folder/1``, … in the order given.
 
-    ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form.
-    Everything is written beside ``folder`` first and then moved into place, so that a crash
-    leaves either the models that were there or the new ones, never a part. Where it happens
-    between the two moves, the models that were there are in ``folder.old``.
+    ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form,
+    ``point_clouds`` PLY files, ``state`` a JSON file with this content beside the models.
+    Everything is written beside ``folder`` first, synced, and then moved into place, so that a
+    crash leaves either the models that were there or the new ones, never a part. If it happens
+    between the two moves, ``recover_models`` completes them. Raises StorageError if the disk is
+    full or cannot be written to; the models that were there stay.
     """
-    fresh = folder.with_name(folder.name + ".new")
+    try:
+        return _export(reconstructions, colors, folder, text, point_clouds, state)
+    except OSError as error:
+        raise StorageError(
+            f"{folder}: models cannot be written ({error.strerror or error})."
+        ) from error
+
+
+def recover_models(folder: Path) -> None:
+    """Complete what a crash between the two moves of ``export_models`` left."""
+    fresh, old = _beside(folder)
+    if not folder.exists() and old.exists() and fresh.exists():
+        fresh.rename(folder)
+    if not folder.exists() and old.exists():
+        old.rename(folder)
+    for leftover in (fresh, old):
+        shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _export(
+    reconstructions: Sequence[pycolmap.Reconstruction],
+    colors: Mapping[int, Uint8Array],
+    folder: Path,
+    text: bool,
+    point_clouds: bool,
+    state: object | None,
+) -> list[ModelSummary]:
+    fresh, _ = _beside(folder)
     shutil.rmtree(fresh, ignore_errors=True)
     fresh.mkdir(parents=True)
     summaries = []
     for number, reconstruction in enumerate(reconstructions):
-        _color(reconstruction, colors)
+        _color(reconstruction, colors, anew=point_clouds)
         model = fresh / str(number)
         model.mkdir()
         reconstruction.write_binary(model)
         if text:
             reconstruction.write_text(model)
-        reconstruction.export_PLY(model / "points3D.ply")
+        if point_clouds:
+            reconstruction.export_PLY(model / "points3D.ply")
+        _check_written(reconstruction, model)
         summaries.append(
             ModelSummary(
                 path=folder / str(number),
@@ -48,21 +92,55 @@ def export_models(
                 mean_track_length=float(reconstruction.compute_mean_track_length()),
             )
         )
-    _replace(folder, fresh)
+    if state is not None:
+        write_json(fresh / STATE, state)
+    _sync_all(fresh)
+    _replace(folder)
     return summaries
 
 
-def _replace(folder: Path, fresh: Path) -> None:
-    old = folder.with_name(folder.name + ".old")
+def _beside(folder: Path) -> tuple[Path, Path]:
+    """Where new models are written, and old ones wait to be removed."""
+    return folder.with_name(folder.name + ".new"), folder.with_name(folder.name + ".old")
+
+
+def _check_written(reconstruction: pycolmap.Reconstruction, model: Path) -> None:
+    """pycolmap does not tell that the disk was full: read back if it may have been."""
+    written = sum(file.stat().st_size for file in model.iterdir())
+    if shutil.disk_usage(model).free > max(written, _ROOM):
+        return
+    try:
+        found = pycolmap.Reconstruction(model)
+        whole = found.num_points3D() == reconstruction.num_points3D()
+    except (ValueError, RuntimeError, IndexError, MemoryError):
+        whole = False
+    if not whole:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _sync_all(folder: Path) -> None:
+    for path in folder.rglob("*"):
+        sync(path)
+    sync(folder)
+
+
+def _replace(folder: Path) -> None:
+    fresh, old = _beside(folder)
     if folder.exists():
         shutil.rmtree(old, ignore_errors=True)
         folder.rename(old)
     fresh.rename(folder)
+    sync(folder.parent)
     shutil.rmtree(old, ignore_errors=True)
 
 
-def _color(reconstruction: pycolmap.Reconstruction, colors: Mapping[int, Uint8Array]) -> None:
-    """Give each point the mean colour of the keypoints in its track."""
+def _color(
+    reconstruction: pycolmap.Reconstruction, colors: Mapping[int, Uint8Array], *, anew: bool
+) -> None:
+    """Give each point the mean colour of the keypoints in its track; if not ``anew``, those alone
+    that have none yet."""
     for point in reconstruction.points3D.values():
+        if not anew and point.color.any():
+            continue
         seen = [colors[e.image_id][e.point2D_idx] for e in point.track.elements]
         point.color = np.mean(seen, axis=0).round().astype(np.uint8)

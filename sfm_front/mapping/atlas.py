@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+import pycolmap
+
 from sfm_front.errors import ConfigError
 from sfm_front.events import (
     DropReason,
@@ -16,7 +18,7 @@ from sfm_front.events import (
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
-from sfm_front.mapping.model import MapperOptions, Model
+from sfm_front.mapping.model import MapperOptions, Model, ModelState
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry, View
 
@@ -77,10 +79,27 @@ class Atlas:
         )
         self.models: list[Model] = []
 
+    def restore(self, models: Iterable[tuple[pycolmap.Reconstruction, ModelState]]) -> None:
+        """Go on from models of an earlier run, all of whose photos are in the view graph."""
+        for reconstruction, state in models:
+            self.models.append(
+                Model.restored(
+                    self.view_graph, self.options.mapper, reconstruction, state, self.emit
+                )
+            )
+        self.initializer.go_on_after(max((model.model_id for model in self.models), default=0))
+
     @property
     def registered(self) -> set[int]:
         """Image ids of the photos that are in some model."""
         return set().union(*(model.registered for model in self.models))
+
+    def model_of(self, image_id: int) -> Model:
+        """The largest model that holds a registered photo. Raises KeyError if none does."""
+        for model in self.models:
+            if model.reconstruction.image(image_id).has_pose:
+                return model
+        raise KeyError(image_id)
 
     @property
     def waiting(self) -> list[int]:

@@ -105,6 +105,10 @@ class Initializer:
             model_ids=self._model_ids,
         )
 
+    def go_on_after(self, model_id: int) -> None:
+        """Give the next model an id after this one."""
+        self._model_ids = count(model_id + 1)
+
     def start(
         self, group: Collection[int], kind: StartKind, *, last_call: bool = False
     ) -> Model | None:

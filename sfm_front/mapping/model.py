@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 import pycolmap
 
 from sfm_front.errors import ConfigError
@@ -21,6 +22,7 @@ from sfm_front.mapping.final_adjustment import final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement, LocalRefinementOptions
 from sfm_front.mapping.refinement_schedule import RefinementSchedule, ScheduleOptions
 from sfm_front.mapping.view_graph import ViewGraph
+from sfm_front.types import Float64Array
 
 # Trials are limited here, by the points a photo sees, not by pycolmap.
 _UNLIMITED_TRIALS = 1_000_000
@@ -143,6 +145,20 @@ class MapperOptions:
         return options
 
 
+@dataclass(frozen=True, kw_only=True)
+class ModelState:
+    """What a model knows beside its reconstruction, to go on from one read from disk."""
+
+    model_id: int
+    # Photos and points at its last global refinement.
+    refined_images: int
+    refined_points: int
+    # Inliers it asks of a photo's pose: fewer if it started from few points.
+    min_pose_inliers: int
+    # False if it was grown with its camera fixed.
+    refine_intrinsics: bool
+
+
 class Model:
     """A model that grows photo by photo over a shared view graph."""
 
@@ -152,8 +168,10 @@ class Model:
         options: MapperOptions,
         *,
         emit: Emit | None = None,
+        reconstruction: pycolmap.Reconstruction | None = None,
     ) -> None:
-        """``emit`` hears of each refinement of the whole model."""
+        """``emit`` hears of each refinement of the whole model; it goes on from the
+        ``reconstruction`` if one is given."""
         # 0 until whoever starts it gives it another.
         self.model_id = 0
         self._view_graph = view_graph
@@ -165,7 +183,38 @@ class Model:
         self._local = LocalRefinement(self._streaming, options.local_refinement)
         self._schedule = RefinementSchedule(options.schedule)
         self._seen_at_failure: dict[int, int] = {}
-        self._mapper, self.reconstruction = view_graph.new_mapper()
+        self._mapper, self.reconstruction = view_graph.new_mapper(reconstruction)
+
+    @classmethod
+    def restored(
+        cls,
+        view_graph: ViewGraph,
+        options: MapperOptions,
+        reconstruction: pycolmap.Reconstruction,
+        state: ModelState,
+        emit: Emit | None = None,
+    ) -> Model:
+        """The model that had this ``state``, over a view graph that holds all its photos."""
+        refine = options.refine_intrinsics and state.refine_intrinsics
+        options = replace(options, refine_intrinsics=refine)
+        model = cls(view_graph, options, emit=emit, reconstruction=reconstruction)
+        model.model_id = state.model_id
+        model._mapping = copy.deepcopy(model._mapping)
+        model._mapping.abs_pose_min_num_inliers = state.min_pose_inliers
+        model._schedule.refined(state.refined_images, state.refined_points)
+        return model
+
+    @property
+    def state(self) -> ModelState:
+        """What ``restored`` needs."""
+        refined_images, refined_points = self._schedule.last
+        return ModelState(
+            model_id=self.model_id,
+            refined_images=refined_images,
+            refined_points=refined_points,
+            min_pose_inliers=self._mapping.abs_pose_min_num_inliers,
+            refine_intrinsics=self._options.refine_intrinsics,
+        )
 
     @property
     def registered(self) -> set[int]:
@@ -303,7 +352,7 @@ class Model:
         return False
 
     def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
-        started = time.perf_counter()
+        started, centers = time.perf_counter(), self._centers()
         # pycolmap does not count a later photo's correspondences to registered ones; taking a
         # photo out would then fail. Beginning again over the same model counts afresh.
         self._mapper.end_reconstruction(False)
@@ -319,7 +368,31 @@ class Model:
         self._local.forget(self._mapper)
         self._note_refined()
         if self._emit is not None:
-            self._emit(ModelRefined(self.model_id, self.num_registered, self.num_points, seconds))
+            self._emit(
+                ModelRefined(
+                    self.model_id,
+                    self.num_registered,
+                    self.num_points,
+                    seconds,
+                    *_shifts(centers, self._centers()),
+                )
+            )
+
+    def _centers(self) -> dict[int, Float64Array]:
+        """(3,) projection centres in world coordinates by image id."""
+        model = self.reconstruction
+        return {i: model.image(i).projection_center() for i in model.reg_image_ids()}
 
     def _note_refined(self) -> None:
         self._schedule.refined(self.num_registered, self.num_points)
+
+
+def _shifts(
+    before: Mapping[int, Float64Array], after: Mapping[int, Float64Array]
+) -> tuple[float, float]:
+    """Median and largest distance between the places of the photos that are in both."""
+    both = [image_id for image_id in before if image_id in after]
+    if not both:
+        return 0.0, 0.0
+    moved = [float(np.linalg.norm(after[i] - before[i])) for i in both]
+    return float(np.median(moved)), max(moved)

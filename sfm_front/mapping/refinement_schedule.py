@@ -41,6 +41,11 @@ class RefinementSchedule:
         self._num_images = 0
         self._num_points = 0
 
+    @property
+    def last(self) -> tuple[int, int]:
+        """Photos and points of the model at its last global refinement."""
+        return self._num_images, self._num_points
+
     def is_due(self, num_images: int, num_points: int) -> bool:
         late = self._num_images >= self._options.large_from
         growth = self._options.large_growth if late else self._options.growth

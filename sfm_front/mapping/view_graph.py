@@ -63,6 +63,10 @@ class ViewGraph:
         """In order of arrival."""
         return list(self._neighbors)
 
+    def name(self, image_id: int) -> str:
+        """What a photo is called."""
+        return str(self._cache.image(image_id).name)
+
     def neighbors(self, image_id: int) -> dict[int, int]:
         """Photos with a verified pair with this one → inliers of the pair."""
         return self._neighbors[image_id]
@@ -100,9 +104,15 @@ class ViewGraph:
                     frontier.append(neighbor)
         return found
 
-    def new_mapper(self) -> tuple[pycolmap.IncrementalMapper, pycolmap.Reconstruction]:
-        """A mapper with an empty model over all photos so far. Call once there is a photo."""
-        reconstruction = pycolmap.Reconstruction()
+    def new_mapper(
+        self, reconstruction: pycolmap.Reconstruction | None = None
+    ) -> tuple[pycolmap.IncrementalMapper, pycolmap.Reconstruction]:
+        """A mapper with a model over all photos so far: an empty one, or one read from disk.
+
+        Call once there is a photo.
+        """
+        if reconstruction is None:
+            reconstruction = pycolmap.Reconstruction()
         reconstruction.load(self._cache)
         mapper = pycolmap.IncrementalMapper(self._cache)
         mapper.begin_reconstruction(reconstruction)

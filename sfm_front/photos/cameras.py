@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
 
 from sfm_front.errors import ConfigError
 from sfm_front.photos.exif import FULL_FRAME_DIAGONAL_MM
-from sfm_front.types import ExtractedPhoto, Photo
+from sfm_front.types import ExtractedPhoto, Photo, StoredPhoto
 
 if TYPE_CHECKING:
     import pycolmap
 
 CameraMode = Literal["auto", "single", "per-folder", "per-image"]
-AnyPhoto: TypeAlias = "Photo | ExtractedPhoto"
+AnyPhoto: TypeAlias = "Photo | ExtractedPhoto | StoredPhoto"
 
 DEFAULT_FOCAL_FACTOR = 1.2
 """Focal length over the long side if nothing is known, as in COLMAP."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from sfm_front.events import PhotoAdded
 from sfm_front.runtime.closeable import Closeable
-from sfm_front.types import CandidateOutcome, Rejected, Rejection
+from sfm_front.storage.atomic import write_atomically
+from sfm_front.types import CandidateOutcome, Rejected, Rejection, StoredPhoto
 
 FILE = "retrieval.jsonl"
 
@@ -16,17 +18,16 @@ FILE = "retrieval.jsonl"
 class RetrievalLog(Closeable):
     """Writes the file; each line is on disk when ``add`` returns."""
 
-    def __init__(self, output: Path) -> None:
-        self._file = (output / FILE).open("w", encoding="utf-8")
+    def __init__(self, output: Path, earlier: Iterable[StoredPhoto] = ()) -> None:
+        """The file begins anew, with the lines of ``earlier`` photos."""
+        file = output / FILE
+        lines = "".join(_line(photo.name, photo.candidates) for photo in earlier)
+        write_atomically(file, lambda new: new.write(lines.encode()))
+        self._file = file.open("a", encoding="utf-8")
 
     def add(self, photo: PhotoAdded) -> None:
         """Write a photo's line."""
-        line = {
-            "name": photo.name,
-            "most_relevant": photo.most_relevant,
-            "candidates": [_row(candidate) for candidate in photo.candidates],
-        }
-        self._file.write(json.dumps(line, ensure_ascii=False) + "\n")
+        self._file.write(_line(photo.name, photo.candidates))
         self._file.flush()
 
     def close(self) -> None:
@@ -41,6 +42,15 @@ def read_candidates(output: Path, name: str) -> tuple[CandidateOutcome, ...]:
             if content["name"] == name:
                 return tuple(_candidate(row) for row in content["candidates"])
     return ()
+
+
+def _line(name: str, candidates: Sequence[CandidateOutcome]) -> str:
+    content = {
+        "name": name,
+        "most_relevant": candidates[0].name if candidates else None,
+        "candidates": [_row(candidate) for candidate in candidates],
+    }
+    return json.dumps(content, ensure_ascii=False) + "\n"
 
 
 def _row(candidate: CandidateOutcome) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from sfm_front.reports.run_summary import (
     RunSummary,
     Totals,
 )
-from sfm_front.types import ModelSummary, Skipped
+from sfm_front.types import ModelSummary, Skipped, StoredPhoto
 
 
 class RunReport:
@@ -30,6 +30,18 @@ class RunReport:
     def add(self, photo: Skipped | PhotoAdded) -> None:
         """Note a photo."""
         self._photos.append(photo)
+
+    def restore(self, photo: StoredPhoto) -> None:
+        """Note a photo of an earlier run; what its mapping took is not known any more."""
+        self._photos.append(
+            PhotoAdded(
+                photo.name,
+                photo.image_id,
+                num_keypoints=photo.num_keypoints,
+                candidates=photo.candidates,
+                seconds=photo.seconds,
+            )
+        )
 
     def finish(
         self,

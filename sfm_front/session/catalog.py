@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping
+from threading import Lock
+
+import pycolmap
 
 from sfm_front.photos.cameras import CameraCatalog, CameraOptions
 from sfm_front.photos.duplicates import DuplicateFinder
-from sfm_front.types import ExtractedPhoto, Skipped, View
+from sfm_front.types import ExtractedPhoto, Features, Skipped, StoredPhoto, Uint8Array, View
 
 
 class PhotoCatalog(Mapping[int, View]):
-    """Views by image id, counted from 1 in order of arrival."""
+    """Views by image id, counted from 1 in order of arrival.
 
-    def __init__(self, cameras: CameraOptions) -> None:
+    Features of photos that were not looked at for long are read again from where they are stored.
+    May be read from several threads.
+    """
+
+    def __init__(
+        self, cameras: CameraOptions, stored: Callable[[int], Features], max_bytes: int
+    ) -> None:
+        """``stored`` gives the features of a photo that is no longer in memory; those in memory
+        take ``max_bytes`` at most."""
         self._cameras = CameraCatalog(cameras)
         self._duplicates = DuplicateFinder()
-        self._views: dict[int, View] = {}
+        self._camera_of: dict[int, pycolmap.Camera] = {}
         self._names: dict[int, str] = {}
+        self._ids: dict[str, int] = {}
+        self._colors: dict[int, Uint8Array] = {}
+        self._features = _FeatureMemory(stored, max_bytes)
 
     def admit(self, photo: ExtractedPhoto) -> View | Skipped:
         """Give a photo that has just arrived its image id and camera; Skipped if it is a copy."""
@@ -24,20 +39,75 @@ class PhotoCatalog(Mapping[int, View]):
         if duplicate is not None:
             return duplicate
         image_id = len(self) + 1
-        view = View(image_id, self._cameras.camera_for(photo).camera, photo.features)
-        self._views[image_id] = view
-        self._names[image_id] = photo.name
-        return view
+        camera = self._cameras.camera_for(photo).camera
+        self._enter(image_id, photo.name, camera, photo.features.colors)
+        self._features.keep(image_id, photo.features)
+        return self[image_id]
+
+    def restore(self, photo: StoredPhoto, camera: pycolmap.Camera, colors: Uint8Array) -> None:
+        """Enter a photo of an earlier run as it was; call in order of arrival."""
+        self._duplicates.check(photo.name, photo.digest)
+        self._cameras.remember(photo, camera)
+        self._enter(photo.image_id, photo.name, camera, colors)
 
     def name(self, image_id: int) -> str:
         """What the photo is called in the models."""
         return self._names[image_id]
 
+    def image_id(self, name: str) -> int:
+        """Raises KeyError if no photo has this name."""
+        return self._ids[name]
+
+    @property
+    def colors(self) -> Mapping[int, Uint8Array]:
+        """Image id → (N, 3) uint8 RGB under each keypoint."""
+        return self._colors
+
+    def _enter(self, image_id: int, name: str, camera: pycolmap.Camera, colors: Uint8Array) -> None:
+        self._camera_of[image_id] = camera
+        self._names[image_id] = name
+        self._ids[name] = image_id
+        self._colors[image_id] = colors
+
     def __getitem__(self, image_id: int) -> View:
-        return self._views[image_id]
+        return View(image_id, self._camera_of[image_id], self._features[image_id])
 
     def __iter__(self) -> Iterator[int]:
-        return iter(self._views)
+        return iter(self._names)
 
     def __len__(self) -> int:
-        return len(self._views)
+        return len(self._names)
+
+
+class _FeatureMemory:
+    """Features in memory, those not looked at for longest dropped first."""
+
+    def __init__(self, stored: Callable[[int], Features], max_bytes: int) -> None:
+        self._stored = stored
+        self._max_bytes = max_bytes
+        self._lock = Lock()
+        self._kept: OrderedDict[int, Features] = OrderedDict()
+        self._num_bytes = 0
+
+    def keep(self, image_id: int, features: Features) -> None:
+        """Hold on to them as long as there is room; the newest always stay."""
+        with self._lock:
+            self._kept[image_id] = features
+            self._num_bytes += _num_bytes(features)
+            while self._num_bytes > self._max_bytes and len(self._kept) > 1:
+                _, dropped = self._kept.popitem(last=False)
+                self._num_bytes -= _num_bytes(dropped)
+
+    def __getitem__(self, image_id: int) -> Features:
+        with self._lock:
+            found = self._kept.get(image_id)
+            if found is not None:
+                self._kept.move_to_end(image_id)
+                return found
+        features = self._stored(image_id)
+        self.keep(image_id, features)
+        return features
+
+
+def _num_bytes(features: Features) -> int:
+    return sum(part.nbytes for part in (features.keypoints, features.descriptors, features.colors))

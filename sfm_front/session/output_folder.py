@@ -8,9 +8,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sfm_front.errors import InputError
+from sfm_front.storage.session_lock import SessionLock
 
 _MARKER = "retrieval.jsonl"
-_FILES = ("database.db", "database.db-shm", "database.db-wal", "report.json", _MARKER)
+DATABASE = "database.db"
+_FILES = (
+    DATABASE,
+    "database.db-shm",
+    "database.db-wal",
+    "events.jsonl",
+    "report.json",
+    _MARKER,
+)
+_STATE = "session.json"
 _MODELS = ("sparse", "sparse.new", "sparse.old")
 _MODEL_NAME = re.compile(r"\d+")
 _MODEL_FILES = frozenset(
@@ -25,11 +35,12 @@ _MODEL_FILES = frozenset(
 )
 
 
-def check_output_folder(output: Path, *, overwrite: bool) -> None:
+def check_output_folder(output: Path, *, overwrite: bool, resume: bool = False) -> None:
     """Raise InputError unless a session may write to ``output``. Changes nothing.
 
     An output is a session's own if ``retrieval.jsonl``, which every session begins with, is in it.
-    Only such an output is replaced, and only if its model folders hold nothing but model files.
+    Only such an output is replaced or, with ``resume``, continued, and only if its model folders
+    hold nothing but model files.
     """
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: not a folder. Give another --output.")
@@ -41,7 +52,7 @@ def check_output_folder(output: Path, *, overwrite: bool) -> None:
             f"{output}: holds {taken[0]}, which this tool did not write. "
             "Move it away, or give another --output."
         )
-    if not overwrite:
+    if not overwrite and not resume:
         raise InputError(
             f"{output}: holds a reconstruction already. Give another --output, "
             "or --overwrite to replace it."
@@ -53,29 +64,47 @@ def check_output_folder(output: Path, *, overwrite: bool) -> None:
         )
 
 
-def make_output_folder(output: Path, *, overwrite: bool) -> None:
-    """Make an empty output of a folder that ``check_output_folder`` has passed.
+def open_output_folder(output: Path, *, overwrite: bool, resume: bool = False) -> SessionLock:
+    """Make the folder if need be, and lock it for this process.
 
-    Removes what an earlier session wrote if ``overwrite``. Raises InputError if the folder cannot
-    be made or written to.
+    Removes what an earlier session wrote if ``overwrite``. Raises InputError as
+    ``check_output_folder`` does, if the folder cannot be made or written to, or if another process
+    writes to it.
     """
-    check_output_folder(output, overwrite=overwrite)
+    check_output_folder(output, overwrite=overwrite, resume=resume)
     try:
         output.mkdir(parents=True, exist_ok=True)
         # Try before removing anything: a read-only output must stay as it is.
-        probe = output / ".sfm_front_probe"
-        probe.touch()
-        probe.unlink()
-        for name in _MODELS:
-            if (output / name).is_dir():
-                shutil.rmtree(output / name)
-        # The marker goes last: what an interrupted removal leaves can still be replaced.
-        for name in _FILES:
-            (output / name).unlink(missing_ok=True)
+        (output / _MARKER).touch()
     except OSError as error:
-        raise InputError(
-            f"{output}: cannot be written to ({error.strerror}). Give another --output."
-        ) from error
+        raise _unwritable(output, error) from error
+    lock = SessionLock(output)
+    try:
+        if overwrite:
+            _clear(output)
+    except OSError as error:
+        lock.close()
+        raise _unwritable(output, error) from error
+    return lock
+
+
+def holds_session(output: Path) -> bool:
+    """Whether a session has begun to write to this folder."""
+    return _is_own_file(output / _MARKER) and _is_own_file(output / DATABASE)
+
+
+def _clear(output: Path) -> None:
+    """Remove what a session wrote; the marker stays, so that a second try may replace the rest."""
+    for name in _MODELS:
+        if (output / name).is_dir():
+            shutil.rmtree(output / name)
+    for name in _FILES:
+        if name != _MARKER:
+            (output / name).unlink(missing_ok=True)
+
+
+def _unwritable(output: Path, error: OSError) -> InputError:
+    return InputError(f"{output}: cannot be written to ({error.strerror}). Give another --output.")
 
 
 def _is_there(path: Path) -> bool:
@@ -100,6 +129,8 @@ def _foreign(output: Path) -> Iterator[Path]:
             yield folder
             continue
         for model in folder.iterdir():
+            if model.name == _STATE and _is_own_file(model):
+                continue
             if model.is_symlink() or not model.is_dir() or not _MODEL_NAME.fullmatch(model.name):
                 yield model
                 continue

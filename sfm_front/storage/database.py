@@ -166,6 +166,14 @@ class PhotoDatabase(Closeable):
         rows = self._rows("SELECT value FROM sfm_front_session WHERE key = ?", (key,))
         return str(rows[0][0]) if rows else None
 
+    def holds_images(self) -> bool:
+        """Whether COLMAP's table of images has any, whoever wrote them."""
+        return bool(self._rows("SELECT 1 FROM images LIMIT 1"))
+
+    def num_photos(self) -> int:
+        """Photos that were written."""
+        return int(self._rows("SELECT count(*) FROM sfm_front_photos")[0][0])
+
     def photos(self) -> Iterator[StoredPhoto]:
         """All photos, in order of arrival."""
         for row in self._each(

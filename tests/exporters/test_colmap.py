@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pycolmap
 import pytest
 from helpers.photo_stream import centre_of, true_matches
 
+from sfm_front.errors import StorageError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.exporters.colmap import export_models
+from sfm_front.exporters import colmap
+from sfm_front.exporters.colmap import export_models, recover_models
 
 BINARY = {"cameras.bin", "frames.bin", "images.bin", "points3D.bin", "rigs.bin", "points3D.ply"}
 TEXT = {"cameras.txt", "frames.txt", "images.txt", "points3D.txt", "rigs.txt"}
@@ -135,7 +138,7 @@ def test_a_crash_leaves_the_models_that_were_there(orbit, tmp_path, at):
     colors = colors_of(orbit, 3)
     export_models([make_model(orbit, 2)], colors, tmp_path / "sparse")
     before = files_below(tmp_path / "sparse")
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(StorageError, match="No space left"):
         export_models(
             [make_model(orbit, 3), Broken(make_model(orbit, 2), at)], colors, tmp_path / "sparse"
         )
@@ -147,8 +150,41 @@ def test_a_crash_leaves_the_models_that_were_there(orbit, tmp_path, at):
 
 
 def test_a_crash_on_the_first_export_leaves_no_models(orbit, tmp_path):
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(StorageError, match="No space left"):
         export_models(
             [Broken(make_model(orbit, 2), "export_PLY")], colors_of(orbit, 2), tmp_path / "sparse"
         )
+    assert not (tmp_path / "sparse").exists()
+
+
+@pytest.mark.parametrize("killed_after", ["writing", "the first move", "the second move"])
+def test_what_a_kill_between_the_moves_leaves_is_completed(orbit, tmp_path, killed_after):
+    sparse, fresh, old = (tmp_path / name for name in ("sparse", "sparse.new", "sparse.old"))
+    export_models([make_model(orbit, 2)], colors_of(orbit, 2), sparse)
+    export_models([make_model(orbit, 3)], colors_of(orbit, 3), tmp_path / "other")
+    (tmp_path / "other").rename(fresh)
+    if killed_after != "writing":
+        sparse.rename(old)
+    if killed_after == "the second move":
+        fresh.rename(sparse)
+    recover_models(sparse)
+    expected = 2 if killed_after == "writing" else 3
+    assert pycolmap.Reconstruction(sparse / "0").num_reg_images() == expected
+    assert [path.name for path in tmp_path.iterdir()] == ["sparse"]
+
+
+def test_models_cut_short_by_a_full_disk_are_noticed(orbit, tmp_path, monkeypatch):
+    """pycolmap does not tell. Free space is what makes us look."""
+    write = pycolmap.Reconstruction.write_binary
+
+    def cut(model: pycolmap.Reconstruction, folder: Path) -> None:
+        write(model, folder)
+        file = folder / "points3D.bin"
+        file.write_bytes(file.read_bytes()[:-100])
+
+    monkeypatch.setattr(pycolmap.Reconstruction, "write_binary", cut)
+    usage = shutil.disk_usage(tmp_path)._replace(free=0)
+    monkeypatch.setattr(colmap.shutil, "disk_usage", lambda _: usage)
+    with pytest.raises(StorageError, match="No space left"):
+        export_models([make_model(orbit, 2)], colors_of(orbit, 2), tmp_path / "sparse")
     assert not (tmp_path / "sparse").exists()

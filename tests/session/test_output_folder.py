@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from helpers.locations import ROOT
 
 from sfm_front.errors import InputError
-from sfm_front.session.output_folder import check_output_folder, make_output_folder
+from sfm_front.session.output_folder import check_output_folder, open_output_folder
+
+
+def opened_and_closed(output: Path, *, overwrite: bool) -> None:
+    open_output_folder(output, overwrite=overwrite).close()
 
 
 def finished(folder: Path) -> Path:
@@ -37,16 +45,16 @@ def put(path: Path) -> Path:
 def test_overwriting_removes_a_finished_output_and_nothing_beside_it(tmp_path):
     output = finished(tmp_path)
     kept = [put(output / name) for name in ("photo.jpg", "sparse woods/p.jpg", "sparse_mine/x")]
-    make_output_folder(output, overwrite=True)
+    opened_and_closed(output, overwrite=True)
     left = {path for path in output.rglob("*") if path.is_file()}
-    assert left == set(kept)
+    assert left == {*kept, output / "retrieval.jsonl"}  # the marker of the session that follows
 
 
 def test_an_output_is_not_overwritten_unasked(tmp_path):
     output = finished(tmp_path)
     before = contents(output)
     with pytest.raises(InputError, match="holds a reconstruction already"):
-        make_output_folder(output, overwrite=False)
+        opened_and_closed(output, overwrite=False)
     assert contents(output) == before
 
 
@@ -59,7 +67,7 @@ def test_overwriting_refuses_model_folders_that_hold_other_files(tmp_path, forei
     put(output / foreign)
     before = contents(output)
     with pytest.raises(InputError, match="Move it away"):
-        make_output_folder(output, overwrite=True)
+        opened_and_closed(output, overwrite=True)
     assert contents(output) == before
 
 
@@ -70,7 +78,7 @@ def test_a_project_of_another_tool_is_refused(tmp_path, theirs, overwrite):
     put(tmp_path / theirs)
     before = contents(tmp_path)
     with pytest.raises(InputError, match="did not write"):
-        make_output_folder(tmp_path, overwrite=overwrite)
+        opened_and_closed(tmp_path, overwrite=overwrite)
     assert contents(tmp_path) == before
 
 
@@ -82,7 +90,7 @@ def test_links_to_other_files_are_refused(tmp_path, name, overwrite):
     (output / name).unlink()
     (output / name).symlink_to(theirs)
     with pytest.raises(InputError):
-        make_output_folder(output, overwrite=overwrite)
+        opened_and_closed(output, overwrite=overwrite)
     assert theirs.read_bytes() == b"precious"
     assert (output / name).is_symlink()
 
@@ -92,14 +100,14 @@ def test_a_linked_model_folder_is_refused(tmp_path):
     output = finished(tmp_path / "output")
     (output / "sparse.old").symlink_to(tmp_path / "theirs")
     with pytest.raises(InputError, match=r"sparse\.old"):
-        make_output_folder(output, overwrite=True)
+        opened_and_closed(output, overwrite=True)
     assert theirs.is_file()
 
 
 def test_a_folder_where_a_file_belongs_is_refused(tmp_path):
     (tmp_path / "retrieval.jsonl").mkdir()
     with pytest.raises(InputError, match=r"retrieval\.jsonl"):
-        make_output_folder(tmp_path, overwrite=True)
+        opened_and_closed(tmp_path, overwrite=True)
 
 
 def test_what_an_interrupted_removal_left_can_be_replaced(tmp_path):
@@ -110,4 +118,31 @@ def test_what_an_interrupted_removal_left_can_be_replaced(tmp_path):
 def test_a_parent_that_is_a_file_is_named(tmp_path):
     below = put(tmp_path / "file") / "output"
     with pytest.raises(InputError, match="cannot be written to"):
-        make_output_folder(below, overwrite=False)
+        opened_and_closed(below, overwrite=False)
+
+
+def test_a_second_writer_is_refused_and_named(tmp_path):
+    output = finished(tmp_path)
+    before = contents(output)
+    with open_output_folder(output, overwrite=False, resume=True):
+        held = contents(output)
+        for overwrite in (False, True):
+            with pytest.raises(InputError, match=f"process {os.getpid()} on .* is writing to it"):
+                open_output_folder(output, overwrite=overwrite, resume=not overwrite)
+        assert contents(output) == held
+    assert contents(output) == before
+
+
+def test_the_lock_of_a_killed_process_is_free(tmp_path):
+    code = (
+        "import os, sys; from pathlib import Path; "
+        "from sfm_front.storage.session_lock import SessionLock; "
+        "lock = SessionLock(Path(sys.argv[1])); os._exit(9)"
+    )
+    killed = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert killed.returncode == 9
+    open_output_folder(finished(tmp_path), overwrite=False, resume=True).close()

@@ -15,7 +15,16 @@ from helpers.photo_stream import described, position_errors_m, registered_names,
 
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.events import Event, ModelRefined, ModelStarted, PhotoAdded
+from sfm_front.events import (
+    Event,
+    ModelRefined,
+    ModelStarted,
+    PhotoAdded,
+    PhotoPlaced,
+    PhotoWaiting,
+    SessionEnded,
+    SessionStarted,
+)
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.model import MapperOptions
 from sfm_front.photos.cameras import CameraOptions
@@ -61,6 +70,7 @@ def tables(database: Path) -> dict[str, list[tuple[object, ...]]]:
         names = [
             name
             for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type='table'")
+            if name != "sfm_front_session"  # whether it is finished
         ]
         return {name: connection.execute(f'SELECT * FROM "{name}"').fetchall() for name in names}
 
@@ -150,19 +160,29 @@ def test_a_listener_hears_of_everything_as_it_happens(orbit, tmp_path):
         given = [session.add_extracted(photo) for photo in (*photos, unreadable)]
         before_the_end = len(heard)
         result = session.finish()
+    assert isinstance(heard[0], SessionStarted)
     photos_heard = [e for e in heard if isinstance(e, PhotoAdded | Skipped)]
     assert photos_heard == given
     # What became of the models comes before the photo that brought it, and is in its result.
-    assert isinstance(heard[0], PhotoAdded)
-    placed = next(e for e in photos_heard if isinstance(e, PhotoAdded) and e.registered)
-    first = heard.index(placed) - len(placed.events)
-    assert tuple(heard[first : heard.index(placed)]) == placed.events
-    assert any(isinstance(event, ModelStarted) for event in placed.events)
+    brought = next(e for e in photos_heard if isinstance(e, PhotoAdded) and e.registered)
+    at = heard.index(brought)
+    assert tuple(heard[at - len(brought.events) : at]) == brought.events
+    assert any(isinstance(event, ModelStarted) for event in brought.events)
+    # The photo is acknowledged first, and then placed.
+    placed = heard[at + 1 : at + 1 + len(brought.registered)]
+    assert tuple(event.name for event in placed) == brought.registered
+    assert all(isinstance(event, PhotoPlaced) and event.num_inliers > 30 for event in placed)
+    waited = [event.name for event in heard if isinstance(event, PhotoWaiting)]
+    assert waited == [photo.name for photo in given[:-1] if photo.name not in photo.registered]
     for photo in given[:-1]:
         refined = [e.seconds for e in photo.events if isinstance(e, ModelRefined)]
         assert photo.seconds.get("refine", 0) == pytest.approx(sum(refined))
     assert any(isinstance(event, ModelRefined) for event in heard[before_the_end:])
     assert result.summary.totals.num_registered == 4
+    assert heard[-1] == SessionEnded(True, 4, 4, 1)
+    lines = (tmp_path / "out" / "events.jsonl").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == len(heard)
+    assert [json.loads(line)["event"] for line in lines][-1] == "session_ended"
 
 
 def test_reports_are_written(session):

@@ -1,0 +1,122 @@
+"""``events.jsonl``: what happens in a session, a line per event, for other programs to follow.
+
+Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO 8601 in UTC;
+``event``; and the fields of the dataclass of that event in ``sfm_front.events``:
+
+| event | says |
+|---|---|
+| ``session_started`` | ``version`` of the package, all ``options``, ``num_photos`` there already |
+| ``photo_arrived`` | the photo was noticed |
+| ``photo_skipped`` | ``reason`` and ``detail`` |
+| ``photo_added`` | acknowledged: all its rows are in the database and on the disk |
+| ``photo_placed`` | model, ``cam_from_world``, camera, inliers, ``latency_s`` from arrival |
+| ``photo_waiting`` | it fits no model yet, and why |
+| ``model_started``, ``model_refined``, ``model_dropped`` | what became of a model |
+| ``registered_structure_less`` | photos placed by two-view geometry alone |
+| ``session_ended`` | ``finished``: whether all models are written |
+
+New fields and events leave the version as it is; readers pass over what they do not know.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from datetime import datetime, timezone
+from enum import Enum
+from pathlib import Path
+from typing import IO, Any
+
+from sfm_front.events import (
+    Event,
+    ModelDropped,
+    ModelRefined,
+    ModelStarted,
+    PhotoAdded,
+    PhotoArrived,
+    PhotoPlaced,
+    PhotoWaiting,
+    RegisteredStructureLess,
+    SessionEnded,
+    SessionStarted,
+)
+from sfm_front.runtime.closeable import Closeable
+from sfm_front.types import Skipped
+
+FILE = "events.jsonl"
+VERSION = 1
+
+_NAMES: dict[type, str] = {
+    SessionStarted: "session_started",
+    PhotoArrived: "photo_arrived",
+    Skipped: "photo_skipped",
+    PhotoAdded: "photo_added",
+    PhotoPlaced: "photo_placed",
+    PhotoWaiting: "photo_waiting",
+    ModelStarted: "model_started",
+    ModelRefined: "model_refined",
+    ModelDropped: "model_dropped",
+    RegisteredStructureLess: "registered_structure_less",
+    SessionEnded: "session_ended",
+}
+
+
+class EventLog(Closeable):
+    """Writes events to a stream; each line is handed to the system at once."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self._stream = stream
+
+    @classmethod
+    def in_folder(cls, output: Path) -> EventLog:
+        """Append to ``output/events.jsonl``; a line that a killed process left torn is removed."""
+        file = output / FILE
+        _drop_torn_line(file)
+        return cls(file.open("a", encoding="utf-8"))
+
+    def write(self, event: Event) -> None:
+        """Write an event."""
+        self._stream.write(as_line(event) + "\n")
+        self._stream.flush()
+
+    def close(self) -> None:
+        self._stream.close()
+
+
+def as_line(event: Event, now: Callable[[], datetime] | None = None) -> str:
+    """An event as a line of JSON, without its end."""
+    time = now() if now else datetime.now(timezone.utc)
+    content = {
+        "v": VERSION,
+        "time": time.isoformat(timespec="milliseconds"),
+        "event": _NAMES[type(event)],
+        **_fields(event),
+    }
+    return json.dumps(content, ensure_ascii=False, default=_plain)
+
+
+def _fields(event: Event) -> dict[str, Any]:
+    fields = asdict(event)
+    if isinstance(event, PhotoAdded):
+        # Those have lines of their own.
+        del fields["events"]
+        fields["verified"] = event.verified
+        fields["most_relevant"] = event.most_relevant
+    return fields
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Enum):
+        return value.value if isinstance(value.value, str) else value.name
+    return str(value)
+
+
+def _drop_torn_line(file: Path) -> None:
+    if not file.is_file():
+        return
+    with file.open("rb+") as content:
+        data = content.read()
+        whole = data.rfind(b"\n") + 1
+        if whole < len(data):
+            content.truncate(whole)

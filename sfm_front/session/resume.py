@@ -1,0 +1,165 @@
+"""Whether an output can be gone on with, and what of a folder it has seen already."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from sfm_front.errors import InputError
+from sfm_front.session.options import SessionOptions
+from sfm_front.storage.database import PhotoDatabase
+from sfm_front.types import FileState, PhotoPath
+
+_OPTIONS = "options"
+_STATE = "state"
+_SOURCES = "sources"
+_RUNNING, _FINISHED = "running", "finished"
+
+# These say how the work is done, not what comes out of it.
+_FREE = frozenset({"threads", "device", "weights", "text", "snapshot_seconds", "cache_mb"})
+
+
+def check_options(database: PhotoDatabase, options: SessionOptions, output: Path) -> bool:
+    """True if there is a session to go on with; the options of a new one are remembered.
+
+    Raises InputError if the stored one was made with other options, or by an earlier version.
+    """
+    now = as_dict(options)
+    text = database.recall(_OPTIONS)
+    if text is None:
+        if database.holds_images():
+            raise InputError(
+                f"{output}: holds a reconstruction of an earlier version, which cannot be "
+                "continued. Give --overwrite, or another --output."
+            )
+        database.remember(_OPTIONS, json.dumps(now))
+        return False
+    for name, before, given in _differences(json.loads(text), now):
+        raise InputError(
+            f"{output}: was made with {name} = {before}, now it is {given}. Give the same options, "
+            "--overwrite, or another --output."
+        )
+    return True
+
+
+def mark_running(database: PhotoDatabase) -> None:
+    """From here on, until it is finished, the session has to be gone on with."""
+    database.remember(_STATE, _RUNNING)
+
+
+def mark_finished(database: PhotoDatabase) -> None:
+    """All models are written."""
+    database.remember(_STATE, _FINISHED)
+
+
+def is_finished(database: PhotoDatabase) -> bool:
+    """Whether it ended with all its models written."""
+    return database.recall(_STATE) == _FINISHED
+
+
+def named_in_session(
+    database: PhotoDatabase,
+    folder: Path,
+    photos: Sequence[PhotoPath],
+    output: Path,
+    *,
+    append: bool,
+) -> list[PhotoPath]:
+    """The photos of a folder under their names in the session, which remembers the folder.
+
+    Names are those below the folder. If another folder has such names already, the new one's
+    photos are named after their folder too. Raises InputError if the session is over another
+    folder and ``append`` is not wanted.
+    """
+    here = str(folder.resolve())
+    prefixes: dict[str, str] = json.loads(database.recall(_SOURCES) or "{}")
+    if here not in prefixes:
+        if prefixes and not append:
+            raise InputError(
+                f"{output}: holds the photos of {next(iter(prefixes))}. Give --append to add those "
+                f"of {folder} to it, or another --output."
+            )
+        prefixes[here] = _free_prefix(database, folder, photos, set(prefixes.values()))
+        database.remember(_SOURCES, json.dumps(prefixes))
+    return [PhotoPath(prefixes[here] + photo.name, photo.path) for photo in photos]
+
+
+def _free_prefix(
+    database: PhotoDatabase, folder: Path, photos: Sequence[PhotoPath], taken: set[str]
+) -> str:
+    names = {photo.name for photo in database.photos()}
+    names |= {photo.name for photo, _ in database.skipped()}
+    own = {photo.name for photo in photos}
+    if not names & own:
+        return ""
+    numbered = (f"{folder.resolve().name}{number or ''}/" for number in count())
+    return next(
+        prefix
+        for prefix in numbered
+        if prefix not in taken and not names & {prefix + name for name in own}
+    )
+
+
+@dataclass(frozen=True)
+class Outstanding:
+    """What of a list of photos a session has not seen yet."""
+
+    new: list[PhotoPath]
+    # Seen under this name, with other content since.
+    changed: list[str]
+    num_known: int
+
+
+def outstanding(database: PhotoDatabase, photos: Iterable[PhotoPath]) -> Outstanding:
+    """Sort photos by whether they are in the database, as used or as skipped.
+
+    A file that was skipped and has changed since is new.
+    """
+    used = {photo.name: photo.file for photo in database.photos()}
+    skipped = {photo.name: file for photo, file in database.skipped()}
+    new, changed, num_known = [], [], 0
+    for photo in photos:
+        now = FileState.of(photo.path)
+        if photo.name in used:
+            num_known += 1
+            if not _same(used[photo.name], now):
+                changed.append(photo.name)
+        elif photo.name in skipped and _same(skipped[photo.name], now):
+            num_known += 1
+        else:
+            new.append(photo)
+    return Outstanding(new, changed, num_known)
+
+
+def _same(before: FileState, now: FileState) -> bool:
+    return (before.size, before.mtime_ns) == (now.size, now.mtime_ns)
+
+
+def as_dict(options: Any) -> Any:
+    """Options as JSON has them."""
+    if is_dataclass(options):
+        return {field.name: as_dict(getattr(options, field.name)) for field in fields(options)}
+    if isinstance(options, tuple | list):
+        return [as_dict(value) for value in options]
+    if isinstance(options, Enum):
+        return options.value
+    return str(options) if isinstance(options, Path) else options
+
+
+def _differences(
+    before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = ""
+) -> Iterable[tuple[str, Any, Any]]:
+    """Dotted name, old and new value of what differs; options of one version only are passed."""
+    for name in before.keys() & now.keys():
+        if name in _FREE or name in ("num_threads",):
+            continue
+        full = f"{prefix}{name}"
+        if isinstance(before[name], dict) and isinstance(now[name], dict):
+            yield from _differences(before[name], now[name], f"{full}.")
+        elif before[name] != now[name]:
+            yield full, before[name], now[name]

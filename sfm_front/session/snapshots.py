@@ -1,0 +1,92 @@
+"""The models of a session that runs, in ``sparse/``: what any COLMAP tool reads, and resume."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pycolmap
+
+from sfm_front.errors import InputError
+from sfm_front.exporters.colmap import STATE, export_models, recover_models
+from sfm_front.mapping.model import Model, ModelState
+from sfm_front.storage.colmap_models import read_model
+from sfm_front.types import ModelSummary, Uint8Array
+
+logger = logging.getLogger(__name__)
+
+_VERSION = 1
+# A snapshot of a large model takes long: at most this share of the time goes into them.
+_MAX_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Models as they were when ``num_photos`` photos had been added."""
+
+    num_photos: int
+    models: tuple[tuple[pycolmap.Reconstruction, ModelState], ...]
+
+
+class Snapshots:
+    """Writes the models at most ``interval_s`` after the last photo that changed them."""
+
+    def __init__(self, folder: Path, interval_s: float) -> None:
+        self._folder = folder
+        self._interval_s = interval_s
+        self._next = time.monotonic() + interval_s
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the last one is old enough."""
+        return time.monotonic() >= self._next
+
+    def write(
+        self,
+        models: Sequence[Model],
+        num_photos: int,
+        colors: Mapping[int, Uint8Array],
+        *,
+        final: bool = False,
+        text: bool = False,
+    ) -> list[ModelSummary]:
+        """Write all models, whole or not at all; ``final`` ones with their point clouds."""
+        started = time.monotonic()
+        summaries = export_models(
+            [model.reconstruction for model in models],
+            colors,
+            self._folder,
+            text=text,
+            point_clouds=final,
+            state={
+                "version": _VERSION,
+                "num_photos": num_photos,
+                "models": [asdict(model.state) for model in models],
+            },
+        )
+        now = time.monotonic()
+        self._next = now + max(self._interval_s, (now - started) / _MAX_SHARE)
+        return summaries
+
+
+def read_snapshot(folder: Path) -> Snapshot | None:
+    """The last one; None if there is none, or it is damaged: then its models are grown anew."""
+    recover_models(folder)
+    try:
+        content: dict[str, Any] = json.loads((folder / STATE).read_text(encoding="utf-8"))
+        if content["version"] != _VERSION:
+            raise ValueError(f"version {content['version']}")
+        states = [ModelState(**state) for state in content["models"]]
+        num_photos = int(content["num_photos"])
+        models = tuple((read_model(folder / str(n)), state) for n, state in enumerate(states))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, InputError) as error:
+        logger.warning("%s: models cannot be read (%s): growing them anew", folder, error)
+        return None
+    return Snapshot(num_photos, models)
