@@ -26,7 +26,7 @@ from sfm_front.session.session import Session, SessionResult
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import ExtractedPhoto, PhotoPath, Skipped, SkipReason
 
-NUM_PHOTOS = 10
+NUM_PHOTOS = 12
 POSITION_TOLERANCE_M = 0.3
 # Every photo is followed by a snapshot, or none is.
 ALWAYS, NEVER = 1e-9, 1e9
@@ -60,7 +60,7 @@ def assert_whole(result: SessionResult, orbit: SyntheticScene, output: Path) -> 
 
 
 @pytest.mark.parametrize("seconds", [ALWAYS, NEVER])
-@pytest.mark.parametrize("stop_after", [1, 6])
+@pytest.mark.parametrize("stop_after", [1, 7])
 def test_a_session_that_was_not_finished_is(
     orbit, photos, tmp_path, monkeypatch, stop_after, seconds
 ):
@@ -124,7 +124,7 @@ from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
 
 snapshots._MAX_SHARE = math.inf
-orbit = make_scene(10, 400, seed=1, layout="orbit", outlier_ratio=0.05)
+orbit = make_scene(12, 400, seed=1, layout="orbit", outlier_ratio=0.05)
 options = SessionOptions(global_descriptor="vlad", threads=1, snapshot_seconds=1e-9)
 session = Session(Path(sys.argv[1]), options)
 for index in range(7):
