@@ -12,10 +12,10 @@ from sfm_front.errors import InputError
 
 
 def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Let ``write`` fill a file beside ``path``, then put it in its place; folders are made.
+    """Let ``write`` fill a file beside ``path``, then rename it to ``path``; folders are created.
 
-    A reader, or a process killed meanwhile, finds what was there before, or all of the new.
-    Raises InputError where the file cannot be written.
+    A reader finds the old file or the complete new one, even if this process is killed.
+    Raises InputError if the file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -24,7 +24,7 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         try:
             with os.fdopen(descriptor, "wb") as file:
                 write(file)
-            # mkstemp makes files that only their owner can read.
+            # mkstemp's files are readable by their owner only.
             partial.chmod(0o644)
             partial.replace(path)
         finally:

@@ -16,10 +16,10 @@ from sfm_front.types import ExtractedPhoto, GeoPosition, PairGeometry
 
 
 class PhotoDatabase(Closeable):
-    """Writes photos to a COLMAP database that COLMAP's own tools can go on with."""
+    """Writes photos to a database that COLMAP's own tools can read and extend."""
 
     def __init__(self, path: Path) -> None:
-        """Open the database at ``path``, or make it."""
+        """Open the database at ``path``, or create it."""
         self._path = path
         self._database = pycolmap.Database.open(path)
 
@@ -30,14 +30,14 @@ class PhotoDatabase(Closeable):
         camera: pycolmap.Camera,
         pairs: Sequence[PairGeometry],
     ) -> None:
-        """Write a photo with all that is known of it, or nothing of it if this raises.
+        """Write a photo, its camera and its pairs; if this raises, no row of the photo remains.
 
-        Ids are those given: frames have their image's id, rigs their camera's.
+        Ids are those given. A frame has its image's id, a rig its camera's.
         """
         try:
             self._write(image_id, photo, camera, pairs)
         except BaseException:
-            # pycolmap's transaction commits even then; COLMAP's database knows no rollback.
+            # pycolmap's transaction commits even then: COLMAP's database has no rollback.
             _remove(self._path, image_id)
             raise
 
@@ -76,7 +76,7 @@ class PhotoDatabase(Closeable):
 
 
 def _remove(path: Path, image_id: int) -> None:
-    """Remove the rows of a photo and of its pairs. Its camera may stay: others can share it."""
+    """Remove the rows of a photo and its pairs. Its camera stays: others may share it."""
     with closing(sqlite3.connect(path)) as connection, connection:
         others = [row[0] for row in connection.execute("SELECT image_id FROM images")]
         pairs = [(pycolmap.image_pair_to_pair_id(image_id, other),) for other in others]
@@ -94,7 +94,8 @@ def _pose_prior(
 ) -> pycolmap.PosePrior:
     """COLMAP's WGS84 prior: latitude and longitude in degrees, altitude in metres.
 
-    A position without altitude has none: COLMAP turns all priors into NaN if the first has one.
+    Positions without altitude get no prior: a NaN in the first prior makes COLMAP turn all of them
+    into NaN.
     """
     prior = pycolmap.PosePrior()
     prior.corr_data_id = image.data_id
