@@ -21,10 +21,10 @@ def export_models(
 ) -> list[ModelSummary]:
     """Colour models and write them to ``folder/0``, ``folder/1``, … in the order given.
 
-    ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form.
-    Everything is written beside ``folder`` first and then moved into place, so that a crash
-    leaves either the models that were there or the new ones, never a part. Where it happens
-    between the two moves, the models that were there are in ``folder.old``.
+    ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text format.
+    Everything is written beside ``folder`` and then moved into place, so that a crash leaves
+    either the old models or the new ones, complete. After a crash between the two moves, the old
+    ones are in ``folder.old``.
     """
     fresh = folder.with_name(folder.name + ".new")
     shutil.rmtree(fresh, ignore_errors=True)
