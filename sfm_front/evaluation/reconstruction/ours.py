@@ -1,4 +1,4 @@
-"""Our own reconstruction as the benchmark runs it: as a user would, in a process of its own."""
+"""Our reconstruction as the benchmark runs it: in its own process, as a user would."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ from sfm_front.storage.colmap_models import find_models
 def run_ours(
     command: Sequence[str], photos: Path, workspace: Path, settings: BenchmarkSettings
 ) -> Run:
-    """Reconstruct the folder ``photos`` into ``workspace/output``.
+    """Reconstruct the folder ``photos`` into ``workspace/output``, with ``log.txt`` beside it.
 
-    ``command`` starts the ``reconstruct`` command; its arguments are added. Leaves ``log.txt``
-    beside the output.
+    ``command`` starts the ``reconstruct`` command; its arguments are appended.
     """
     workspace.mkdir(parents=True, exist_ok=True)
     output = workspace / "output"
@@ -55,7 +54,7 @@ def _arguments(settings: BenchmarkSettings) -> list[str]:
 
 
 def _photo_seconds(report: dict[str, Any]) -> tuple[float, ...]:
-    """The stages of each photo that was used, summed."""
+    """Seconds of each photo that was not skipped, summed over its stages."""
     return tuple(
         sum(photo["seconds"].values())
         for photo in report.get("photos", [])
