@@ -1,4 +1,4 @@
-"""Measure our reconstruction against pycolmap's pipelines on the same photos, in one run.
+"""Compare our reconstruction with pycolmap's pipelines on the same photos, in one run.
 
 A FOLDER holds photos, or has them in its images/. Ground truth is looked for in its gt/.
 """
@@ -31,10 +31,10 @@ RECONSTRUCT = [sys.executable, str(Path(__file__).resolve().parent / "reconstruc
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__,
-        epilog="Rivals pair: " + "; ".join(f"{name}: {how}" for name, how in RIVALS.items()) + ".",
+        epilog="Rivals match: " + "; ".join(f"{name}: {how}" for name, how in RIVALS.items()) + ".",
     )
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
-    parser.add_argument("--gt", type=Path, metavar="MODEL", help="true poses, with one FOLDER")
+    parser.add_argument("--gt", type=Path, metavar="MODEL", help="true poses of a single FOLDER")
     parser.add_argument(
         "--rivals",
         default=",".join(RIVALS),
@@ -50,10 +50,10 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         "--order",
         choices=("name", "time", "random"),
         default="name",
-        help="in which photos reach us; the rivals take them all at once",
+        help="in which ours takes the photos; the rivals get them all at once",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the first run; later ones add 1")
-    parser.add_argument("--profile", action="store_true", help="say where our seconds go")
+    parser.add_argument("--profile", action="store_true", help="print seconds by stage of ours")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every run's figures")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="write a bar chart")
     parser.add_argument(
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> None:
 
 
 def check(args: argparse.Namespace, rivals: list[str], scenes: list[BenchmarkScene]) -> None:
-    """Refuse before the first run what would only show after the last."""
+    """Refuse before the first run what would otherwise fail after the last."""
     unknown = [name for name in rivals if name not in RIVALS]
     if unknown:
         raise ConfigError(f"--rivals: {', '.join(unknown)} unknown; there are {', '.join(RIVALS)}")
@@ -114,7 +114,7 @@ def check(args: argparse.Namespace, rivals: list[str], scenes: list[BenchmarkSce
         raise ConfigError("--gt goes with one FOLDER; put each scene's model into its gt/ instead")
     names = [scene.name for scene in scenes]
     if len(set(names)) < len(names):
-        raise ConfigError(f"two FOLDERs are called alike ({', '.join(names)}); rename one")
+        raise ConfigError(f"two FOLDERs have the same name ({', '.join(names)}); rename one")
     if args.keep and args.keep.exists() and any(args.keep.iterdir()):
         raise InputError(f"{args.keep}: not empty; give a new folder to --keep")
     if args.figure:

@@ -1,8 +1,8 @@
-"""Measure our retrieval against the paper's rivals on the same photos, in one run.
+"""Compare our retrieval with the paper's rivals on the same photos, in one run.
 
-A DATASET is KIND:FOLDER. pool: scenes, each a folder with its photos in images/, where two photos
-are relevant to each other if a COLMAP model says that they share points. holidays, oxford5k,
-paris6k, roxford5k, rparis6k: the published datasets, photos and ground truth as they are unpacked.
+A DATASET is KIND:FOLDER. pool: scenes, each a folder with its photos in images/; two photos are
+relevant to each other if they share points in a COLMAP model. holidays, oxford5k, paris6k,
+roxford5k, rparis6k: the published datasets, photos and ground truth as unpacked.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--methods",
         metavar="NAMES",
-        help=f"separated by commas, of {', '.join(METHODS)}; {OURS}:VECTOR is ours with another "
+        help=f"separated by commas, from {', '.join(METHODS)}; {OURS}:VECTOR is ours with another "
         "global vector (default: all but networks without --weights)",
     )
     parser.add_argument(
@@ -46,10 +46,10 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         action="append",
         default=[],
         metavar="NETWORK=FILE",
-        help=f"of {', '.join(NETWORKS)}; may be given several times",
+        help=f"weights of {', '.join(NETWORKS)}; may be given several times",
     )
     parser.add_argument(
-        "--models", type=Path, metavar="DIR", help="of a pool's scenes; those missing are built"
+        "--models", type=Path, metavar="DIR", help="of a pool's scenes; missing ones are built"
     )
     parser.add_argument(
         "--min-shared", type=int, default=20, metavar="N", help="points, in a pool (default: 20)"
@@ -61,14 +61,14 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--candidates", type=int, default=25, metavar="N", help="of ours")
     parser.add_argument("--rerank-features", type=int, default=800, metavar="N", help="of ours")
     parser.add_argument("--max-image-size", type=int, default=1600, metavar="PX")
-    parser.add_argument("--max-features", type=int, default=4000, metavar="N", help="a photo")
+    parser.add_argument("--max-features", type=int, default=4000, metavar="N", help="per photo")
     parser.add_argument("--threads", type=int, metavar="N", help="(default: all cores)")
     parser.add_argument(
         "--cache",
         type=Path,
         default=Path("outputs/retrieval_cache"),
         metavar="DIR",
-        help="keeps what photos were described by (default: %(default)s)",
+        help="keeps the described photos (default: %(default)s)",
     )
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write the table")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
@@ -77,7 +77,7 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         "--paper-figures",
         type=Path,
         metavar="DIR",
-        help="draw answers, global vectors in a plane and first layers, of a few queries",
+        help="draw answers, global vectors in a plane and first layers for a few queries",
     )
     return parser.parse_args(argv)
 
@@ -110,7 +110,7 @@ def parse_weights(text: str) -> tuple[str, Path]:
 
 
 def default_methods(weights: Mapping[str, Path]) -> list[str]:
-    """All that can run without asking for a download."""
+    """All methods that need no download."""
     return [name for name in METHODS if name not in NETWORKS or name in weights]
 
 
@@ -140,7 +140,7 @@ def benchmark(args: argparse.Namespace) -> None:
 
 
 def main() -> int:
-    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line a query of its own
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # else one line per query
     try:
         benchmark(parse())
     except SfmFrontError as error:

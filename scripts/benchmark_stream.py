@@ -1,7 +1,7 @@
-"""Measure what a photo costs by its place in a long stream, on a synthetic flight.
+"""Measure the cost of a photo by its place in a long stream, on a synthetic flight.
 
-Features are given, with known truth: nothing is read or detected, so what is timed is the path of
-a photo from retrieval to mapping.
+Features and ground truth are given; nothing is read or detected: a photo is timed from retrieval
+to mapping.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _MIN_PHOTOS = 200
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--photos", type=int, default=1000, metavar="N", help="(default: 1000)")
-    parser.add_argument("--points", type=int, default=1000, metavar="N", help="in a photo's view")
+    parser.add_argument("--points", type=int, default=1000, metavar="N", help="points per photo")
     parser.add_argument("--threads", type=int, metavar="N", help="(default: all cores)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every photo's figures")
@@ -71,7 +71,7 @@ def tell(photo: PhotoAdded) -> None:
 def format_result(result: StreamResult) -> str:
     count = len(result.photos)
     bounds = [*range(0, count, 100), count]
-    lines = ["photos         seconds  with refinement  amortized  processor's  memory MiB"]
+    lines = ["photos         seconds  with refinement  amortized  CPU seconds  memory MiB"]
     amortized = result.amortized_seconds()
     lines += [
         _line(start, end, result.photos[start:end], float(np.mean(amortized[start:end])))
@@ -87,11 +87,11 @@ def format_result(result: StreamResult) -> str:
     growth = result.growth(early, late)
     lines += [
         f"growth from photos 100-200 to {late.start}-{late.stop}: {growth.seconds:.2f}, "
-        f"with global refinement as it fell {growth.seconds_with_refinement:.2f}, "
+        f"with global refinement {growth.seconds_with_refinement:.2f}, "
         f"amortized {growth.amortized_seconds:.2f}, "
-        f"of the processor's seconds {growth.processor_seconds:.2f}",
-        f"they follow the photo's number to the power {result.exponent(100):.2f}",
-        "memory a photo: " + ("-" if per_photo is None else f"{per_photo / 2**20:.2f} MiB"),
+        f"CPU seconds {growth.processor_seconds:.2f}",
+        f"CPU seconds follow the photo's number to the power {result.exponent(100):.2f}",
+        "memory per photo: " + ("-" if per_photo is None else f"{per_photo / 2**20:.2f} MiB"),
         f"end of the session: {result.finish_seconds:.1f} s",
         f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}",
     ]

@@ -1,4 +1,4 @@
-"""Make data_samples/village: photos of a procedural village, and their ground truth.
+"""Render data_samples/village: photos of a procedural village, with ground truth.
 
 The same seed gives the same scene, flight and photos. See data_samples/README.md.
 """

@@ -1,4 +1,4 @@
-"""Learn the visual words of VLAD from folders of photos, and write them to a file."""
+"""Learn VLAD's visual words from folders of photos and write them to a file."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--words", type=int, default=256, help="number of visual words")
     parser.add_argument("--dimension", type=int, default=64, help="of projected descriptors")
     parser.add_argument(
-        "--per-photo", type=int, default=400, help="descriptors drawn a photo to find words in"
+        "--per-photo", type=int, default=400, help="descriptors drawn per photo to learn words"
     )
-    parser.add_argument("--max-features", type=int, default=4000, help="SIFT features a photo")
+    parser.add_argument("--max-features", type=int, default=4000, help="SIFT features per photo")
     parser.add_argument("--max-image-size", type=int, default=1600, help="in pixels")
     parser.add_argument("--seed", type=int, default=0, help="of the draw and of k-means")
     return parser.parse_args()
@@ -64,7 +64,7 @@ def parse_arguments() -> argparse.Namespace:
 def extract_features(options: argparse.Namespace) -> Iterator[Features]:
     """The features of each photo below the folders that has any.
 
-    Raises InputError for a folder that is not there or holds no photo.
+    Raises InputError if a folder is missing or holds no photo.
     """
     # One thread, so that the same photos give the same file on every machine.
     cv2.setNumThreads(1)

@@ -1,4 +1,4 @@
-"""Look at a sparse model: python scripts/view.py outputs/NAME/sparse/0 [--screenshot OUT.png]."""
+"""View a sparse model: python scripts/view.py outputs/NAME/sparse/0 [--screenshot OUT.png]."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rooms of the package: which may import which, read from the source without running it."""
+"""Which room of the package may import which, read from the source without running it."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def imports() -> list[Import]:
 
 @pytest.fixture(scope="module")
 def arrows(imports: list[Import]) -> list[Import]:
-    """Imports between rooms, but for the exceptions."""
+    """Imports between rooms, without the exceptions."""
     found = between_rooms(imports, PACKAGE.name)
     return [arrow for arrow in found if (arrow.importer, arrow.imported) not in EXCEPTIONS]
 

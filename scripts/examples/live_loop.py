@@ -1,8 +1,8 @@
-"""Reconstruct photos while they arrive in a folder.
+"""Reconstruct photos as they arrive in a folder.
 
     python scripts/examples/live_loop.py FOLDER OUTPUT [--idle SECONDS]
 
-Copy photos into FOLDER meanwhile. The loop ends when nothing new has come for --idle seconds.
+Copy photos into FOLDER while it runs. It ends after --idle seconds without a new photo.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from sfm_front.photos.formats import EXTENSIONS
 
 
 def arriving_photos(folder: Path, idle_s: float, poll_s: float = 0.2) -> Iterator[Path]:
-    """Each photo in ``folder`` once, as soon as its file no longer grows between two looks."""
+    """Each photo in ``folder`` once, as soon as its file has stopped growing."""
     taken: set[Path] = set()
     sizes: dict[Path, int] = {}
-    waited_s = 0.0  # the work of the caller does not count
+    waited_s = 0.0  # without the caller's own time
     while waited_s < idle_s:
         photos = [path for path in folder.iterdir() if path.name.lower().endswith(EXTENSIONS)]
         before, sizes = sizes, {path: path.stat().st_size for path in photos}
@@ -36,8 +36,8 @@ def arriving_photos(folder: Path, idle_s: float, poll_s: float = 0.2) -> Iterato
 
 
 def main() -> None:
-    """Feed a session with what arrives, one photo at a time."""
-    parser = argparse.ArgumentParser(description="Reconstruct photos while they arrive.")
+    """Add photos to a session as they arrive."""
+    parser = argparse.ArgumentParser(description="Reconstruct photos as they arrive.")
     parser.add_argument("folder", type=Path, help="where photos arrive")
     parser.add_argument("output", type=Path, help="a folder to write to")
     parser.add_argument("--idle", type=float, default=30.0, metavar="SECONDS")

@@ -1,8 +1,8 @@
-"""Retrieve photos by a global descriptor of one's own, joined with VLAD.
+"""Retrieve photos by a custom global descriptor, joined with VLAD.
 
     python scripts/examples/own_descriptor.py FOLDER
 
-Prints the nearest other photo for each photo. The part added here is a colour histogram.
+Prints the most similar other photo for each photo. The descriptor is a colour histogram.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class ColourHistogram:
 
 def main() -> None:
     """Describe every photo, remember it, then look up its neighbour."""
-    parser = argparse.ArgumentParser(description="Retrieve photos by a descriptor of one's own.")
+    parser = argparse.ArgumentParser(description="Retrieve photos by a custom descriptor.")
     parser.add_argument("folder", type=Path, help="photos, sub-folders included")
     photos = list_photos(parser.parse_args().folder)
     descriptor = GlobalDescriptor(networks=[ColourHistogram()], local=[Vlad()])

@@ -17,9 +17,9 @@ COLUMNS = ("photo", "registered", "most relevant", "verified pairs", "seconds")
 
 
 def table_rows(output: Path) -> list[tuple[str, ...]]:
-    """One row for each photo, in the order in which they came."""
+    """One row per photo, in order of arrival."""
     report = json.loads((output / "report.json").read_text(encoding="utf-8"))
-    # retrieval.jsonl has a line for each photo that was used, none for those skipped.
+    # retrieval.jsonl has one line per photo that was not skipped.
     lines = (output / "retrieval.jsonl").read_text(encoding="utf-8").splitlines()
     retrieved = {line["name"]: line for line in map(json.loads, lines)}
     return [table_row(photo, retrieved.get(photo["name"], {})) for photo in report["photos"]]
@@ -41,7 +41,7 @@ def table_row(photo: dict[str, Any], retrieval: dict[str, Any]) -> tuple[str, ..
 
 
 def main() -> None:
-    """Print the table, its columns as wide as they need to be."""
+    """Print the table with aligned columns."""
     parser = argparse.ArgumentParser(description="Print what became of each photo.")
     parser.add_argument("output", type=Path, help="a folder that a session has written to")
     try:

@@ -1,4 +1,4 @@
-"""Where the drone was and what its camera is."""
+"""The drone's poses and its camera."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NUM_ORBIT = 13
 
 
 def plan_flight(seed: int) -> list[pycolmap.Rigid3d]:
-    """cam_from_world of every photo, in the order of the flight: a survey, then an orbit."""
+    """cam_from_world of every photo, in flight order: a survey, then an orbit."""
     rng = np.random.default_rng(seed)
     poses = []
     for line, northing in enumerate((-14.0, 14.0)):

@@ -1,4 +1,4 @@
-"""The colour of a surface at a point: reflectance before light falls on it."""
+"""The reflectance of surfaces."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .terrain import ROAD_HALF_WIDTH_M, fields, road_distance
 class Surface:
     """N points on surfaces of one material.
 
-    ``xyz`` and ``normal`` (N, 3) in the world, ``owner`` (N,) the object, ``origin`` (N, 3) and
-    ``radius`` (N,) where it stands and how round it is, ``footprint`` (N,) metres a pixel covers.
+    ``xyz`` and ``normal`` (N, 3) in world coordinates, ``owner`` (N,) the object, ``origin`` (N, 3)
+    and ``radius`` (N,) its place and radius, ``footprint`` (N,) metres per pixel.
     """
 
     xyz: Floats
@@ -28,23 +28,23 @@ class Surface:
     footprint: Floats
 
     def noise(self, seed: int, cell: float, octaves: int, gain: float = 0.6) -> Floats:
-        """Fractal noise in the world, in about [-1, 1]."""
+        """Fractal noise in world coordinates, in about [-1, 1]."""
         return fractal(
             self.xyz, seed, cell=cell, octaves=octaves, gain=gain, footprint=self.footprint
         )
 
     def draw(self, number: int) -> Floats:
-        """A random number in [0, 1) that is the same all over an object."""
+        """A random number in [0, 1), constant over an object."""
         return unit(hash_cells(self.owner[:, None], 77), number)
 
     def tint(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> Floats:
-        """A random colour (N, 3) between two that is the same all over an object."""
+        """A random colour (N, 3) between two, constant over an object."""
         share = np.stack([self.draw(number) for number in (11, 12, 13)], axis=1)
         lowest = np.array(low, dtype=np.float32)
         return lowest + (np.array(high, dtype=np.float32) - lowest) * share
 
     def unrolled(self) -> tuple[Floats, Floats]:
-        """Metres along the surface (N,): level, and up."""
+        """Metres along the surface (N,): horizontally, and up."""
         offset = self.xyz - self.origin
         level = np.stack([-self.normal[:, 1], self.normal[:, 0]], axis=1)
         steepness = np.linalg.norm(level, axis=1)
@@ -66,7 +66,7 @@ def reflectance(material: Material, surface: Surface) -> Floats:
 
 
 def mix(base: Floats, other: Floats | tuple[float, float, float], share: Floats) -> Floats:
-    """Blend colours (N, 3) by a share (N,) that is cut to [0, 1]."""
+    """Blend colours (N, 3) by a share (N,), clipped to [0, 1]."""
     share = np.clip(share, 0.0, 1.0)[:, None]
     return (base * (1.0 - share) + np.asarray(other, dtype=np.float32) * share).astype(np.float32)
 
@@ -136,7 +136,7 @@ def _crops(xy: Floats, footprint: Floats, grass: Floats, patches: Floats) -> Flo
 def _blocks(
     s: Surface, row: float, length: float, joint: float, seed: int
 ) -> tuple[Floats, Floats]:
-    """Courses of blocks of random length: a random number a block, and 1 in the joints."""
+    """Courses of blocks of random length: a random number per block, and 1 in the joints."""
     along, up = s.unrolled()
     along = along + 0.05 * s.noise(seed + 1, 0.7, 2)
     course = np.floor(up / row)
@@ -175,7 +175,7 @@ def _plaster(s: Surface) -> Floats:
 
 
 def _windows(s: Surface, colour: Floats, above: Floats) -> Floats:
-    """Openings in about half of the places where a window could be, no two houses alike."""
+    """Windows in about half of the possible places, different on every house."""
     along, _ = s.unrolled()
     width = 2.0 + 0.9 * s.draw(4)
     side = np.round(np.arctan2(s.normal[:, 1], s.normal[:, 0]) * 2.0)

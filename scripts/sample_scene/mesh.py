@@ -1,4 +1,4 @@
-"""Pieces of geometry, and the one triangle mesh that they are joined to."""
+"""Pieces of geometry, joined into one triangle mesh."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Material(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh with what shading needs to know of each triangle.
+    """A triangle mesh with what shading needs.
 
     ``vertices`` and ``normals`` (V, 3) float32, ``triangles`` (T, 3) uint32. ``material`` and
-    ``owner`` (T,): the owner is the object that the triangle belongs to, an index into ``origins``
-    (O, 3), where the object stands, and ``radii`` (O,), 0 for what is not round.
+    ``owner`` (T,): the owner is the triangle's object, an index into ``origins`` (O, 3), the
+    object's place, and ``radii`` (O,), 0 if it is not round.
     """
 
     vertices: Floats
@@ -57,7 +57,7 @@ class MeshBuilder:
     _num_vertices: int = 0
 
     def start(self, origin: tuple[float, float, float], *, radius: float = 0.0) -> None:
-        """The pieces that follow belong to a new object."""
+        """Begin a new object, which the next pieces belong to."""
         self._origins.append(origin)
         self._radii.append(radius)
 
@@ -72,7 +72,7 @@ class MeshBuilder:
     def quad(self, corners: Floats, material: Material, *, edge: float = 0.8) -> None:
         """A patch over four corners (4, 3), counter-clockwise seen from outside.
 
-        It is cut into a grid of about ``edge`` metres, fine enough for ambient light a vertex.
+        It is cut into a grid of about ``edge`` metres, fine enough for ambient light per vertex.
         """
         a, b, c, d = corners.astype(np.float64)
         columns = max(1, round(float(np.linalg.norm(b - a)) / edge))
@@ -151,13 +151,13 @@ class MeshBuilder:
 
 
 def local_frame(x: float, y: float, z: float, yaw: float) -> Floats:
-    """(3, 4) world-from-local of something that stands at (x, y, z), turned by ``yaw`` radians."""
+    """(3, 4) world_from_local of an object at (x, y, z), rotated by ``yaw`` radians."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.array([[cos, -sin, 0, x], [sin, cos, 0, y], [0, 0, 1, z]], dtype=np.float32)
 
 
 def to_world(frame: Floats, points: NDArray[np.floating]) -> Floats:
-    """Local points (N, 3) in the world."""
+    """Local points (N, 3) in world coordinates."""
     moved: Floats = (points @ frame[:, :3].T + frame[:, 3]).astype(np.float32)
     return moved
 

@@ -1,7 +1,7 @@
-"""Random values that depend on nothing but a position in the world and a seed.
+"""Random values that depend only on a position in the world and a seed.
 
 Every photo sees the same texture because it is a function of the surface point; nothing repeats
-because cells are hashed instead of being looked up in a table.
+because cells are hashed, not looked up in a table.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ Floats = NDArray[np.floating[Any]]
 Ints = NDArray[np.int32]
 Hashes = NDArray[np.uint32]
 
-# One odd constant an axis, as in C. Ericson, Real-Time Collision Detection (2005), 7.1.3.
+# One odd constant per axis, as in C. Ericson, Real-Time Collision Detection (2005), 7.1.3.
 _STRIDES = np.array([0x8DA6B343, 0xD8163841, 0xCB1AB31F], dtype=np.uint32)
-# Turning each octave hides the lattice that value noise is built on.
+# Rotating each octave hides the lattice of value noise.
 _OCTAVE_TURN_RAD = 0.61
-_BLOCK = 1 << 12  # points that stay in the processor's cache while they are worked on
+_BLOCK = 1 << 12  # points per step, which fit the processor's cache
 
 
 def hash_cells(cells: Ints, seed: int | Ints) -> Hashes:
-    """Hash integer cells (N, D) with D up to 3 and a seed, one or one a cell, to (N,) uint32."""
+    """Hash integer cells (N, D), D up to 3, and a seed, one or one per cell, to (N,) uint32."""
     mixed = np.asarray(seed).astype(np.uint32) * np.uint32(0x9E3779B1)
     key = np.broadcast_to(mixed, (len(cells),)).copy()
     for axis in range(cells.shape[1]):
@@ -58,8 +58,8 @@ def fractal(
 ) -> Floats:
     """Sum of ``octaves`` of noise in about [-1, 1]; ``cell`` is the size of the coarsest in metres.
 
-    An octave fades out where its cells come near ``footprint`` (N,), the size of a pixel on the
-    surface: what a pixel cannot resolve would differ at random from photo to photo.
+    An octave fades out as its cells approach ``footprint`` (N,), the size of a pixel on the
+    surface: detail below a pixel would differ randomly from photo to photo.
     """
     total = np.zeros(len(points), dtype=np.float32)
     norm = 0.0
@@ -76,7 +76,7 @@ def fractal(
         amplitude *= gain
         cell *= 0.5
         turned[:, :2] = turned[:, :2] @ turn
-    # Octaves are independent, so their deviations add up as squares do.
+    # Octaves are independent: their variances add up.
     scaled: Floats = total / np.float32(1.4 * np.sqrt(norm))
     return scaled
 
@@ -84,8 +84,8 @@ def fractal(
 def spots(points: Floats, seed: int, *, cell: float, share: float) -> tuple[Floats, Hashes]:
     """One round spot in a ``share`` of the square cells of points (N, 2).
 
-    Returns how deep a point lies in its spot (N,), 0 outside to 1 in the middle, and its cell's
-    hash for colours.
+    Returns the depth of each point in its spot (N,), 0 outside to 1 in the middle, and its cell's
+    hash, for colours.
     """
     scaled = points / np.float32(cell)
     corner = np.floor(scaled)

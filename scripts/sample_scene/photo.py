@@ -1,4 +1,4 @@
-"""PhotoDatabase a rendered picture as a drone's camera would: sensor noise, JPEG, EXIF with GPS."""
+"""Save a rendered picture as a drone's camera would: sensor noise, JPEG, EXIF with GPS."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from PIL.TiffImagePlugin import IFDRational
 
 from .noise import Floats
 
-# A place in the middle of the Atlantic, so that nobody's village is meant.
+# In the middle of the Atlantic, so that no real village is meant.
 ORIGIN_LATITUDE_DEG, ORIGIN_LONGITUDE_DEG, ORIGIN_ALTITUDE_M = 45.0, -30.0, 200.0
 GPS_NOISE_M = 1.0
 SENSOR_NOISE = 1.3  # standard deviation in grey levels
@@ -34,7 +34,7 @@ def save_photo(
     cam_from_world: pycolmap.Rigid3d,
     seed: int,
 ) -> None:
-    """Write a picture (H, W, 3) in [0, 1] with what the camera knew when it took it."""
+    """Write a picture (H, W, 3) in [0, 1] with the EXIF of its camera and pose."""
     rng = np.random.default_rng(seed)
     noisy = 255.0 * _vignetted(picture) + rng.normal(0.0, SENSOR_NOISE, picture.shape)
     pixels = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
@@ -57,7 +57,7 @@ def _exif(camera: pycolmap.Camera, number: int, east_north_up: NDArray[np.float6
     exif[Base.Make] = "sfm_front"
     exif[Base.Model] = "Rendered Drone"
     exif[Base.Orientation] = 1
-    # The focal length as a share of the picture's diagonal is what all cameras have in common.
+    # The focal length over the picture's diagonal is the same for the equivalent on 35 mm film.
     share = camera.focal_length / float(np.hypot(camera.width, camera.height))
     taken_at = _FIRST_PHOTO_AT + timedelta(seconds=_SECONDS_BETWEEN_PHOTOS * number)
     exif.get_ifd(IFD.Exif).update(

@@ -12,7 +12,7 @@ from .materials import Surface, reflectance
 from .mesh import Material, Mesh
 from .noise import Floats, value_noise
 
-# Where a pixel's rays pass through it: a turned square, which smooths edges of any direction.
+# A pixel's rays pass through a rotated square, which smooths edges of any direction.
 _SAMPLES = np.array([(0.125, 0.625), (0.375, 0.125), (0.625, 0.875), (0.875, 0.375)])
 _SUN = np.array([-0.52, -0.42, 0.74]) / np.linalg.norm([-0.52, -0.42, 0.74])
 _SUN_COLOUR = np.array([2.75, 2.5, 2.1])
@@ -23,21 +23,21 @@ _SUN_SOFTNESS_RAD = 0.004
 _HAZE_M = 1200.0
 _AMBIENT_RAYS = 24
 _AMBIENT_REACH_M = 7.0
-_LIFT_M = 0.02  # rays that leave a surface start this far above it
+_LIFT_M = 0.02  # metres above a surface at which rays from it start
 _BLOCK = 1 << 19
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A mesh that is ready to be looked at."""
+    """A mesh that is ready to be rendered."""
 
     mesh: Mesh
     caster: o3d.t.geometry.RaycastingScene
-    openness: Floats  # (V,) share of the sky that a vertex sees
+    openness: Floats  # (V,) fraction of the sky visible from a vertex
 
 
 def prepare(mesh: Mesh, seed: int) -> Stage:
-    """Build the ray structure and work out how open to the sky each vertex is."""
+    """Build the ray-casting structure and compute each vertex's visible fraction of the sky."""
     caster = o3d.t.geometry.RaycastingScene()
     caster.add_triangles(
         o3d.core.Tensor.from_numpy(mesh.vertices), o3d.core.Tensor.from_numpy(mesh.triangles)
@@ -53,7 +53,7 @@ def prepare(mesh: Mesh, seed: int) -> Stage:
 
 
 def camera_rays(camera: pycolmap.Camera) -> Floats:
-    """Directions (H * W * 4, 3) in the camera's frame with z = 1; a pixel's rays in a row."""
+    """Directions (H * W * 4, 3) in camera coordinates with z = 1; a pixel's rays are adjacent."""
     column, row = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     # COLMAP's pixel (0, 0) covers [0, 1) in x and y, so its centre is at (0.5, 0.5).
     corners = np.stack([column, row], axis=-1)[:, :, None, :]
@@ -124,7 +124,7 @@ def _trace(
 
 
 def _roughened(xyz: Floats, normal: Floats, material: Floats) -> Floats:
-    """Leaves and rocks catch the light unevenly."""
+    """Normals with noise on leaves and rocks, which reflect unevenly."""
     normal = normal.copy()
     for kind, strength, cell in ((Material.LEAVES, 0.8, 0.45), (Material.ROCK, 0.45, 0.6)):
         chosen = material == kind
@@ -137,7 +137,7 @@ def _roughened(xyz: Floats, normal: Floats, material: Floats) -> Floats:
 def _reaches(
     caster: o3d.t.geometry.RaycastingScene, start: Floats, direction: Floats, reach: float
 ) -> Floats:
-    """1 where nothing stands in the way within ``reach`` metres, else 0."""
+    """1 for rays that hit nothing within ``reach`` metres, else 0."""
     rays = np.hstack([start, _normalised(direction)]).astype(np.float32)
     blocked = caster.test_occlusions(o3d.core.Tensor.from_numpy(rays), tnear=0.0, tfar=reach)
     free: Floats = 1.0 - blocked.numpy().astype(np.float32)
@@ -145,7 +145,7 @@ def _reaches(
 
 
 def _develop(light: Floats) -> Floats:
-    """Linear light to what a camera stores: a soft shoulder, then gamma."""
+    """Linear light → what a camera stores: a soft shoulder, then gamma."""
     exposed = 0.62 * light
     # K. Narkowicz's fit to the ACES film curve.
     toned = exposed * (2.51 * exposed + 0.03) / (exposed * (2.43 * exposed + 0.59) + 0.14)

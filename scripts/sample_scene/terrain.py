@@ -1,4 +1,4 @@
-"""The lie of the land: how high the ground is, and where the roads and fields are."""
+"""The terrain: height of the ground, roads and fields."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def height(points: Floats) -> Floats:
     hill = 6.5 * (1.0 - np.tanh((off_castle + wobble - 22.0) / 7.2))
     off_valley = y + 48.0 - 0.32 * x - 9.0 * np.sin(x / 23.0)
     valley = -6.5 * np.exp(-((off_valley / 9.5) ** 2))
-    # Ground is levelled where people walk, and stays rough elsewhere.
+    # Level where people walk, rough elsewhere.
     smooth = np.clip(road_distance(points) / 4.0, 0.15, 1.0)
     total: Floats = rolling + rough * smooth + hill + valley
     return total
@@ -64,9 +64,9 @@ def road_distance(points: Floats) -> Floats:
 
 
 def fields(points: Floats) -> tuple[Hashes, Floats]:
-    """Which field points (N, 2) lie in, as a hash, and the metres to the field's edge.
+    """The field of each point (N, 2), as a hash, and the metres to the field's edge.
 
-    Fields are the cells of a Voronoi diagram of one random seed a square.
+    Fields are the cells of a Voronoi diagram with one random seed per square.
     """
     size = np.float32(38.0)
     bent = points + 2.5 * np.stack(
@@ -90,7 +90,7 @@ def fields(points: Floats) -> tuple[Hashes, Floats]:
 
 
 def add_ground(builder: MeshBuilder) -> None:
-    """Add the terrain, finer in the middle than at the rim that only the horizon shows."""
+    """Add the terrain, coarser at the rim, which is only seen on the horizon."""
     steps = np.linspace(-1.0, 1.0, _NUM_STEPS + 1)
     axis: NDArray[np.float64] = _HALF_SIZE_M * (0.14 * steps + 0.86 * steps**5)
     x, y = np.meshgrid(axis, axis)

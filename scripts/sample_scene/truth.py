@@ -1,4 +1,4 @@
-"""The true model of the flight: the camera, the poses, and points on surfaces with their tracks."""
+"""The true model of the flight: camera, poses, and surface points with their tracks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .noise import Floats
 from .render import Stage
 
-_VISIBLE_WITHIN = 2e-3  # of the distance, between a point and what its ray hits
+_VISIBLE_WITHIN = 2e-3  # largest distance of a ray's hit from its point, as a fraction of the depth
 
 
 def true_model(
@@ -25,9 +25,9 @@ def true_model(
     num_points: int,
     seed: int,
 ) -> pycolmap.Reconstruction:
-    """A COLMAP model in metres, x east, y north, z up; a point is seen wherever nothing hides it.
+    """A COLMAP model in metres, x east, y north, z up; every photo in view of a point observes it.
 
-    The points are what rays through random pixels of the photos hit.
+    The points are where rays through random pixels of the photos hit.
     """
     rng = np.random.default_rng(seed)
     xyz = _surface_points(stage, camera, poses, num_points, rng)
@@ -74,9 +74,9 @@ def _visible(
     cam_from_world: pycolmap.Rigid3d,
     xyz: NDArray[np.float64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Which points a photo sees, and at which pixels (N, 2)."""
+    """The points a photo sees, and their pixels (N, 2)."""
     in_camera = cam_from_world * xyz
-    # Far outside the picture the distortion polynomial may bend points back into it.
+    # Distortion may map points far outside the picture back into it.
     ahead = in_camera[:, 2] > np.hypot(in_camera[:, 0], in_camera[:, 1])
     candidates = np.flatnonzero(ahead)
     pixels = np.asarray(camera.img_from_cam(in_camera[candidates]))

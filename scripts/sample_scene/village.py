@@ -1,4 +1,4 @@
-"""What stands on the ground: a castle, a church, houses, trees and boulders."""
+"""The objects of the village: a castle, a church, houses, trees and boulders."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _add_castle(builder: MeshBuilder) -> None:
 
 
 def _add_wall(builder: MeshBuilder, start: Floats, end: Floats, *, top: float, gap: float) -> None:
-    """A curtain wall with battlements; ``gap`` metres in its middle are left open for the gate."""
+    """A curtain wall with battlements and a gate, ``gap`` metres wide, in its middle."""
     along = end - start
     length = float(np.hypot(*along))
     middle = 0.5 * (start + end)
@@ -209,7 +209,7 @@ def _free_places(
     reach: float,
     room: float,
 ) -> Floats:
-    """``count`` random places (N, 2) up to ``reach`` metres out, less those that are taken."""
+    """``count`` random places (N, 2) up to ``reach`` metres out, without occupied ones."""
     places = (reach * rng.uniform(-1.0, 1.0, (count, 2))).astype(np.float32)
     clear = road_distance(places) > ROAD_HALF_WIDTH_M + room
     for x, y, radius in taken:

@@ -1,4 +1,4 @@
-"""What a benchmark ran on."""
+"""The machine a benchmark ran on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sfm_front.session.options import available_cores
 
 
 def machine() -> dict[str, Any]:
-    """Processor, its cores and the versions that decide about speed; ready for JSON."""
+    """Processor, number of cores and the versions that affect speed; ready for JSON."""
     return {
         "cpu": _cpu_name(),
         "cores": available_cores(),

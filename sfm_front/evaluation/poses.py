@@ -30,10 +30,10 @@ def pose_errors(
     """(P,) float64: the error of each pair's relative pose in degrees, in [0, 180] or infinite.
 
     The error is the larger of the angle between the rotations and the angle between the
-    directions of the translations. It is infinite where no model holds both photos; where several
-    do, the largest model counts. ``pairs`` names photos of ``truth``; by default all of its pairs.
-    Photos are the same when their names are, in upper or lower case. Raises ``InputError`` where
-    ``truth`` does not know a photo of ``pairs`` or has names that differ in case alone.
+    directions of the translations. It is infinite if no model holds both photos; if several do,
+    the largest model counts. ``pairs`` names photos of ``truth``; by default all of its pairs.
+    Names are compared without regard to case. Raises ``InputError`` if ``truth`` lacks a photo of
+    ``pairs`` or has names that differ only in case.
     """
     true_poses = _poses_by_name(truth)
     names = list(true_poses)
@@ -65,14 +65,14 @@ def pose_errors(
 
 
 def auc(errors: Float64Array, thresholds: Sequence[float] = AUC_THRESHOLDS_DEG) -> list[float]:
-    """Area under the recall curve up to each threshold, divided by it: in [0, 1].
+    """Area under the recall curve up to each threshold, divided by the threshold: in [0, 1].
 
     The curve joins (0, 0) and, for the i-th smallest of n errors, (error, i / n) by straight
     lines and is level from the last error below the threshold to the threshold; its area is
-    exact. Infinite errors are never recalled. Raises ``ValueError`` without errors.
+    exact. Infinite errors are never recalled. Raises ``ValueError`` if ``errors`` is empty.
     """
     if not len(errors):
-        raise ValueError("no errors: the area under their curve is not defined")
+        raise ValueError("no errors: the area under their curve is undefined")
     ordered = np.concatenate([[0.0], np.sort(errors)])
     recall = np.arange(len(ordered)) / len(errors)
     areas = []
@@ -88,13 +88,13 @@ _Pose = tuple[Float64Array, Float64Array]
 
 
 def _poses_by_name(model: pycolmap.Reconstruction) -> dict[str, _Pose]:
-    """Rotation (3, 3) camera from world and centre (3,) of each registered photo, by name."""
+    """Rotation (3, 3), camera from world, and centre (3,) of each registered photo, by name."""
     poses: dict[str, _Pose] = {}
     for image_id in model.reg_image_ids():
         image = model.images[image_id]
         name = image.name.casefold()
         if name in poses:
-            raise InputError(f"two photos are named {image.name} but for the case; rename one")
+            raise InputError(f"two photos are named {image.name}, ignoring case; rename one")
         poses[name] = (image.cam_from_world().rotation.matrix(), image.projection_center())
     return poses
 
@@ -113,9 +113,9 @@ def _relative(
 def _angles_deg(truth: _Pose, found: _Pose) -> tuple[Float64Array, Float64Array]:
     """Angles (P,) between rotations and between directions of translations, in degrees.
 
-    Both formulas keep their precision at small angles, where the arc cosine loses it. Photos
-    taken from one place have no true direction, hence no error in it; found in one place when
-    they were not, they have the largest.
+    Both formulas are precise at small angles, where the arc cosine is not. Photos taken from one
+    place have no true direction, hence no error in it; photos wrongly placed at one point have the
+    largest.
     """
     chord = np.linalg.norm(truth[0] - found[0], axis=(1, 2)) / (2 * np.sqrt(2))
     rotation = 2 * np.arcsin(np.clip(chord, 0, 1))
@@ -127,7 +127,7 @@ def _angles_deg(truth: _Pose, found: _Pose) -> tuple[Float64Array, Float64Array]
 
 
 def _vanishes(baselines: Float64Array) -> NDArray[np.bool_]:
-    """(P,): whether a baseline is nothing but rounding beside the longest."""
+    """(P,): whether a baseline is only rounding error compared to the longest."""
     lengths = np.linalg.norm(baselines, axis=1)
     nothing: NDArray[np.bool_] = lengths <= 1e-9 * lengths.max(initial=0.0)
     return nothing

@@ -17,8 +17,8 @@ _POLL_SECONDS = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """``peak_memory_bytes`` is the resident set of the process without its children; None where
-    the system does not tell (it has no /proc). ``last_line`` is what it printed last."""
+    """``peak_memory_bytes`` is the peak resident set of the process without its children; None on
+    systems without /proc. ``last_line`` is the last line it printed."""
 
     return_code: int
     wall_seconds: float
@@ -27,7 +27,7 @@ class Measured:
 
 
 def measure(command: Sequence[str], log: Path) -> Measured:
-    """Run ``command`` to its end, with standard output and error in the file ``log``."""
+    """Run ``command`` to its end; standard output and error go to the file ``log``."""
     peak = _Peak()
     with log.open("wb") as sink:
         started = perf_counter()
@@ -36,7 +36,7 @@ def measure(command: Sequence[str], log: Path) -> Measured:
             stdin=subprocess.DEVNULL,
             stdout=sink,
             stderr=subprocess.STDOUT,
-            # What was printed last stands last, to whichever stream it went.
+            # Unbuffered, so that both streams' lines are in the order they were printed.
             env=module_environment() | {"PYTHONUNBUFFERED": "1"},
         )
         ended = Event()
@@ -57,7 +57,7 @@ def measure(command: Sequence[str], log: Path) -> Measured:
 
 
 def resident_bytes() -> int | None:
-    """Memory that this process holds now; None where the system does not tell."""
+    """Resident memory of this process now; None on systems without /proc."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except OSError:
@@ -66,9 +66,9 @@ def resident_bytes() -> int | None:
 
 
 class _Peak:
-    """The kernel's own high-water mark, read again and again because it ends with the process.
+    """The kernel's high-water mark, polled because it disappears with the process.
 
-    ``getrusage`` is no help: a child starts with the peak of the process that forked it.
+    ``getrusage`` does not help: a child starts with the peak of the process that forked it.
     """
 
     def __init__(self) -> None:

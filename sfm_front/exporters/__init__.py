@@ -1,1 +1,1 @@
-"""Models written in the formats of other tools."""
+"""Models in the formats of other tools."""

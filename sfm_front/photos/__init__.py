@@ -1,1 +1,1 @@
-"""From a folder to decoded photos and their cameras."""
+"""A folder → decoded photos and their cameras."""

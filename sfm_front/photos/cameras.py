@@ -1,4 +1,4 @@
-"""Photos -> the COLMAP cameras that they share, with an initial focal length."""
+"""Photos → the COLMAP cameras they share, with an initial focal length."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ CameraMode = Literal["auto", "single", "per-folder", "per-image"]
 AnyPhoto: TypeAlias = "Photo | ExtractedPhoto | StoredPhoto"
 
 DEFAULT_FOCAL_FACTOR = 1.2
-"""Focal length over the long side if nothing is known, as in COLMAP."""
+"""Focal length over the long side if EXIF gives none, as in COLMAP."""
 
 PLAUSIBLE_FOCAL_FACTORS = (0.1, 10.0)
-"""An EXIF focal length outside this range, in long sides, counts as wrong."""
+"""EXIF focal lengths outside this range, in long sides, are ignored."""
 
 PHOTOS_PER_SIZE = 10
 """Photos without EXIF share cameras while their folder has at most one size, plus one per this many
-photos. Film frames, phones and benchmarks have one size per folder; photos from the internet have
-nearly as many sizes as photos, and equal ones by chance (TUNING: photos-per-size)."""
+photos. Film frames, phones and benchmarks have one size per folder; internet photos have nearly as
+many sizes as photos, and equal sizes only by chance (TUNING: photos-per-size)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class CameraOptions:
     # A COLMAP camera model.
     model: str = "SIMPLE_RADIAL"
     # Known calibration, in COLMAP's order and in pixels of the file. It applies to the first photo
-    # and those of its size; other photos start from their own focal length.
+    # and all of its size; photos of other sizes start from their own focal length.
     params: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -83,7 +83,7 @@ class CameraChoice(NamedTuple):
 
 @dataclass(slots=True)
 class _Folder:
-    """Photos without EXIF in one folder: number so far, and sizes irrespective of orientation."""
+    """Photos without EXIF in one folder: their number so far, and sizes as (short, long) side."""
 
     num_photos: int = 0
     sizes: set[tuple[int, int]] = field(default_factory=set)
@@ -92,8 +92,8 @@ class _Folder:
 class CameraCatalog:
     """Assigns cameras to photos that arrive one at a time.
 
-    An earlier assignment is never changed: mapping already uses it. A resumed session
-    calls ``remember`` for its photos in their order, and goes on as if it had never stopped.
+    An assignment never changes: mapping already uses it. A resumed session calls ``remember`` for
+    its earlier photos in order, and continues as if it had never stopped.
     """
 
     def __init__(self, options: CameraOptions | None = None) -> None:
@@ -104,7 +104,7 @@ class CameraCatalog:
         self._last_id = 0
 
     def camera_for(self, photo: AnyPhoto) -> CameraChoice:
-        """The camera of a photo that has just arrived. The object is shared with earlier photos.
+        """The camera of a newly arrived photo. The object may be shared with earlier photos.
 
         Raises ConfigError if the given calibration does not fit the first photo.
         """
@@ -169,10 +169,10 @@ class CameraCatalog:
 
 
 def focal_prior_px(photo: AnyPhoto) -> float | None:
-    """The focal length in pixels that EXIF gives, or None if absent or implausible.
+    """The focal length in pixels according to EXIF; None if absent or implausible.
 
-    From the 35 mm equivalent as in COLMAP (by diagonals); else from the focal length and the
-    sensor width of make and model in COLMAP's camera database, for which pycolmap reads the file.
+    From the 35 mm equivalent, by diagonals as in COLMAP; else from the focal length and the sensor
+    width of this make and model in COLMAP's camera database, for which pycolmap reads the file.
     """
     exif = photo.exif
     focal_px: float | None = None
@@ -203,6 +203,6 @@ def _check_principal_point(
     point = [params[i] for i in camera.principal_point_idxs()]
     if not all(0 < at < side for at, side in zip(point, (photo.width, photo.height), strict=False)):
         raise ConfigError(
-            f"camera params put the principal point at {tuple(point)}, outside of {photo.name} "
+            f"camera params put the principal point at {tuple(point)}, outside {photo.name} "
             f"({photo.width} x {photo.height}). Give them in pixels of the files."
         )

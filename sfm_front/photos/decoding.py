@@ -1,4 +1,4 @@
-"""Bytes of an image file of any kind -> (h, w, 3) uint8 RGB pixels, or why there are none."""
+"""Bytes of an image file → (h, w, 3) uint8 RGB pixels, or why there are none."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from sfm_front.photos.formats import ImageFormat, format_of, tiff_size
 from sfm_front.types import Exif, SkipReason, Uint8Array
 
 MAX_PIXELS = 2**28
-"""Larger images are refused: their RGB pixels alone would take more than 0.8 GB of memory."""
+"""Larger images are refused: their RGB pixels alone take more than 0.8 GB of memory."""
 
 _FULL_RANGES = tuple(2**bits - 1 for bits in (8, 10, 12, 14, 16, 32))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decoded:
-    """``pixels`` (h, w, 3) uint8 RGB at the working size; ``width``, ``height`` of the file."""
+    """``pixels`` (h, w, 3) uint8 RGB at the working size; ``width``, ``height`` are the file's."""
 
     pixels: Uint8Array
     width: int
@@ -40,9 +40,9 @@ class Undecodable:
 
 
 def decode(data: bytes, max_image_size: int) -> Decoded | Undecodable:
-    """Decode an image and shrink its long side to ``max_image_size``; it is never enlarged.
+    """Decode an image and reduce its long side to ``max_image_size`` pixels; never enlarge it.
 
-    Pixels stay as stored: EXIF orientation is not applied, as in COLMAP. Anything transparent is
+    Pixels stay as stored: EXIF orientation is not applied, as in COLMAP. Transparent images are
     put on black. Never raises, whatever the bytes.
     """
     if not data:
@@ -56,7 +56,7 @@ def decode(data: bytes, max_image_size: int) -> Decoded | Undecodable:
         return Undecodable(SkipReason.TRUNCATED, f"the {image_format.name} data ends too soon")
     try:
         return _decode(data, image_format, max_image_size)
-    except Exception as error:  # Hostile bytes make a decoder raise anything.
+    except Exception as error:  # Decoders raise anything on hostile bytes.
         if "truncated" in str(error).lower():
             return Undecodable(SkipReason.TRUNCATED, f"the {image_format.name} data ends too soon")
         return Undecodable(SkipReason.UNREADABLE, f"damaged {image_format.name}: {error}")
@@ -68,11 +68,11 @@ def _decode(data: bytes, image_format: ImageFormat, max_image_size: int) -> Deco
     except SyntaxError:
         if image_format.name != "TIFF":
             raise
-        image = None  # Pillow has no colour image of floats or 32-bit integers; OpenCV has.
+        image = None  # Pillow has no float or 32-bit integer colour images; OpenCV has.
     width, height = image.size if image is not None else tiff_size(data)
     if width * height > MAX_PIXELS:
         return Undecodable(SkipReason.UNREADABLE, f"{width} x {height} pixels are too many")
-    exif = Exif() if image is None else exif_of(image)  # Before a TIFF's pixels: they close it.
+    exif = Exif() if image is None else exif_of(image)  # First: loading pixels closes a TIFF.
     if image is None:
         pixels = _to_8_bit_rgb(_decode_with_opencv(data))
     elif _is_deep(image, data):
@@ -85,10 +85,10 @@ def _decode(data: bytes, image_format: ImageFormat, max_image_size: int) -> Deco
 
 
 def _decode_reduced(image: ImageFile, max_image_size: int) -> None:
-    """Let the JPEG decoder shrink by a power of two, which costs less than decoding in full.
+    """Let the JPEG decoder reduce by a power of two, which is faster than decoding in full.
 
-    Only where both sides divide: it rounds sizes up, and a row that is partly padding would
-    shift all coordinates by a fraction of it.
+    Only if it divides both sides: the decoder rounds sizes up, and the padding in the last row or
+    column would shift all coordinates by a fraction of a pixel.
     """
     width, height = image.size
     for factor in (8, 4, 2):
@@ -102,7 +102,7 @@ def _decode_reduced(image: ImageFile, max_image_size: int) -> None:
 
 
 def _load_rgb(image: ImageFile) -> Uint8Array:
-    """Pixels of an image of at most 8 bits a channel: grey, palette, CMYK, alpha and so on."""
+    """Pixels of an image with at most 8 bits per channel: grey, palette, CMYK, alpha and so on."""
     image.load()
     if image.mode == "RGB" and not image.has_transparency_data:
         return np.array(image)
@@ -115,7 +115,7 @@ def _load_rgb(image: ImageFile) -> Uint8Array:
 
 
 def _is_deep(image: ImageFile, data: bytes) -> bool:
-    """Whether a channel has more than 8 bits; Pillow would keep the upper 8 of a colour image."""
+    """Whether a channel has more than 8 bits; Pillow keeps only the upper 8 of colour images."""
     if image.mode.startswith(("I", "F")):
         return True
     if image.format == "PNG":
@@ -134,20 +134,21 @@ def _load_deep(image: ImageFile, data: bytes) -> Uint8Array:
 
 
 def _decode_with_opencv(data: bytes) -> NDArray[np.generic]:
-    """(h, w) grey, or (h, w, 3 or 4) RGB or RGBA, of the file's own type."""
+    """(h, w) grey, or (h, w, 3 or 4) RGB or RGBA, in the file's own data type."""
     pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:
-        raise ValueError("no decoder for this kind of pixels")
+        raise ValueError("no decoder for these pixels")
     if pixels.ndim == 3 and pixels.shape[2] >= 3:
         pixels[..., :3] = pixels[..., 2::-1].copy()
     return pixels
 
 
 def _to_8_bit_rgb(deep: NDArray[np.generic]) -> Uint8Array:
-    """(h, w) or (h, w, c) of more than 8 bits -> (h, w, 3) uint8.
+    """(h, w) or (h, w, c) with more than 8 bits per channel → (h, w, 3) uint8.
 
-    The full range is that of the file's type unless the brightest value says that the camera
-    used 10, 12 or 14 of 16 bits, as many do. Floats end at 1, or at the brightest value if above.
+    White is the smallest of the usual ranges, 8, 10, 12, 14, 16 and 32 bits, that holds the
+    brightest value: many cameras use only some of 16 bits. For floats it is 1, or the brightest
+    value if above.
     """
     values = np.nan_to_num(deep.astype(np.float32), nan=0.0, posinf=0.0, neginf=0.0)
     if values.ndim == 2:
@@ -166,7 +167,7 @@ def _to_8_bit_rgb(deep: NDArray[np.generic]) -> Uint8Array:
 
 
 def _shrink(pixels: Uint8Array, width: int, height: int, max_image_size: int) -> Uint8Array:
-    """``pixels`` at the working size of a photo that is ``width`` x ``height`` in the file."""
+    """``pixels`` reduced to the working size of a file of ``width`` x ``height`` pixels."""
     scale = min(1.0, max_image_size / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     if (pixels.shape[1], pixels.shape[0]) == size:

@@ -1,4 +1,4 @@
-"""What the camera wrote into a photo: EXIF tags -> Exif, however broken they are."""
+"""EXIF tags, however broken → Exif."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sfm_front.photos.formats import format_of
 from sfm_front.types import Exif, GeoPosition
 
 FULL_FRAME_DIAGONAL_MM = 43.27
-"""Diagonal of 35 mm film, to which CIPA DCG-001 relates 35 mm equivalent focal lengths."""
+"""Diagonal of 35 mm film, the reference for 35 mm equivalent focal lengths (CIPA DCG-001)."""
 
 _EXIF_IFD, _GPS_IFD = 0x8769, 0x8825
 _MM_PER_RESOLUTION_UNIT = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
@@ -22,7 +22,7 @@ _PLAUSIBLE_SENSOR_DIAGONAL_MM = (1.0, 100.0)
 
 
 def read_exif(path: Path) -> Exif:
-    """EXIF of a file, without decoding its pixels; an empty Exif where it cannot be read."""
+    """EXIF of a file, without decoding its pixels; an empty Exif if it cannot be read."""
     try:
         with path.open("rb") as file:
             image_format = format_of(file.read(16))
@@ -30,24 +30,24 @@ def read_exif(path: Path) -> Exif:
                 return Exif()
             file.seek(0)
             return exif_of(image_format.open(file))
-    except Exception:  # Broken headers raise anything; PhotoReader will give the reason.
+    except Exception:  # Broken headers raise anything; PhotoReader reports the reason.
         return Exif()
 
 
 def exif_of(image: Image) -> Exif:
-    """EXIF of an opened image. Never raises: what is missing, NaN, divided by zero or out of
-    range is left out.
+    """EXIF of an opened image. Never raises: missing, NaN, infinite and out-of-range values are
+    left out.
 
-    ``focal_length_35mm`` is the camera's own figure or, without one, what follows from the focal
-    length and the sensor size (focal plane resolution times pixel dimensions). Those dimensions
-    are the camera's, so the figure also holds for photos that were shrunk later, where COLMAP's
-    focal length in pixels is too large by the factor of shrinking.
+    ``focal_length_35mm`` is the camera's own value or, without one, derived from the focal length
+    and the sensor size (pixel dimensions over focal plane resolution). EXIF's pixel dimensions are
+    the camera's, so it also holds for photos that were reduced later; COLMAP's focal length in
+    pixels is then too large by that factor.
     """
     try:
         main = image.getexif()
         tags: dict[int, Any] = {**main, **main.get_ifd(_EXIF_IFD)}
         gps = main.get_ifd(_GPS_IFD)
-    except Exception:  # Pillow's parser raises whatever the broken bytes lead it to.
+    except Exception:  # Pillow's parser raises anything on broken bytes.
         return Exif()
     orientation = _integer(tags.get(0x0112))
     return Exif(
@@ -82,7 +82,7 @@ def _focal_length_35mm(tags: Mapping[int, Any], size: tuple[int, int]) -> float 
 
 
 def _captured_at(tags: Mapping[int, Any]) -> datetime | None:
-    """Local time on the camera's clock: taken, else digitised, else last changed."""
+    """Local time on the camera's clock: when taken, else digitised, else last changed."""
     for time_tag, fraction_tag in ((0x9003, 0x9291), (0x9004, 0x9292), (0x0132, 0x9290)):
         try:
             when = datetime.strptime(_text(tags.get(time_tag)), "%Y:%m:%d %H:%M:%S")
@@ -90,7 +90,7 @@ def _captured_at(tags: Mapping[int, Any]) -> datetime | None:
             continue
         fraction = _text(tags.get(fraction_tag))
         if fraction.isascii() and fraction.isdigit():
-            # Six digits: rounding up could leave the calendar.
+            # Cut to six digits: rounding up could overflow the calendar.
             when += timedelta(microseconds=int(fraction[:6].ljust(6, "0")))
         return when
     return None
@@ -101,7 +101,7 @@ def _position(gps: Mapping[int, Any]) -> GeoPosition | None:
     longitude = _degrees(gps.get(4), negative=_text(gps.get(3)).upper().startswith("W"))
     if latitude is None or longitude is None or abs(latitude) > 90 or abs(longitude) > 180:
         return None
-    if latitude == 0 and longitude == 0:  # What receivers write before they have a fix.
+    if latitude == 0 and longitude == 0:  # Receivers without a fix write this.
         return None
     altitude = _number(gps.get(6))
     if altitude is not None and gps.get(5) in (1, b"\x01"):  # Below sea level.
@@ -110,7 +110,7 @@ def _position(gps: Mapping[int, Any]) -> GeoPosition | None:
 
 
 def _degrees(parts: Any, *, negative: bool) -> float | None:
-    """(degrees, minutes, seconds) -> degrees; later parts may be missing."""
+    """(degrees, minutes, seconds) → degrees; later parts may be missing."""
     if not isinstance(parts, Sequence) or not 1 <= len(parts) <= 3:
         return None
     total = 0.0
@@ -144,7 +144,7 @@ def _integer(value: Any) -> int:
 
 
 def _text(value: Any) -> str:
-    """Text up to the first NUL: some cameras pad with them, and with what stood there before."""
+    """Text up to the first NUL: some cameras pad with NULs or leave old text behind them."""
     if isinstance(value, bytes):
         value = value.decode("utf-8", errors="replace")
     return value.split("\0")[0].strip() if isinstance(value, str) else ""

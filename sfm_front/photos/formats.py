@@ -1,4 +1,4 @@
-"""The image formats that are read: which one a file's bytes are, and whether they end too soon."""
+"""The image formats that can be read: which one a file has, and whether its end is missing."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from PIL import (
 from PIL.ImageFile import ImageFile
 
 EXTENSIONS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".webp")
-"""Extensions, in lower case, of the files that are taken for photos."""
+"""Extensions of photos, in lower case."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImageFormat:
     """One format.
 
-    ``signatures`` are what a file may begin with. ``open`` reads the header of a binary file;
-    pixels are read by ``load``. It is the format's own reader rather than ``PIL.Image.open``,
-    whose guard against decompression bombs refuses the 200-megapixel JPEGs of today's phones and
-    is set by a global flag. ``is_cut_short`` tells whether a whole file's bytes end before the
-    image does; where it always says no, decoding finds out.
+    ``signatures`` are the first bytes a file may have. ``open`` reads the header of a binary file;
+    ``load`` on the result reads the pixels. It is the format's own reader instead of
+    ``PIL.Image.open``, whose guard against decompression bombs refuses the 200-megapixel JPEGs of
+    today's phones and is a global flag. ``is_cut_short``: whether the bytes of a file end before
+    its image does; if it is always False, decoding finds out.
     """
 
     name: str
@@ -39,7 +39,7 @@ class ImageFormat:
 
 
 def format_of(data: bytes) -> ImageFormat | None:
-    """The format announced by a file's first bytes (12 are enough), whatever its name says."""
+    """The format by a file's first bytes (12 are enough), whatever its name."""
     for known in FORMATS:
         if data.startswith(known.signatures):
             return known if known.name != "WebP" or data[8:12] == b"WEBP" else None
@@ -49,20 +49,21 @@ def format_of(data: bytes) -> ImageFormat | None:
 def _jpeg_is_cut_short(data: bytes) -> bool:
     """Whether no end-of-image marker follows the start of the scan.
 
-    Decoders tend to fill what is missing with grey. The search begins at the scan: a thumbnail
-    inside the header has an end marker of its own, and phones append further images and films
-    after the image. Within a scan a byte 0xFF of the data is escaped (ITU-T T.81, B.1.1.5).
+    Decoders tend to fill the missing part with grey. The search begins at the scan because a
+    thumbnail in the header has its own end marker, and does not expect the marker last because
+    phones append further images and videos. Within a scan, data bytes 0xFF are escaped (ITU-T
+    T.81, B.1.1.5).
     """
     at = 2
     while at + 4 <= len(data):
         if data[at] != 0xFF:
-            return False  # No marker: damaged, which is for the decoder to say.
+            return False  # No marker: damaged, which the decoder reports.
         marker = data[at + 1]
         if marker == 0xDA:
             return data.find(b"\xff\xd9", at) < 0
         if marker == 0xFF:  # A fill byte.
             at += 1
-        elif marker == 0x01 or 0xD0 <= marker <= 0xD9:  # Markers that stand alone.
+        elif marker == 0x01 or 0xD0 <= marker <= 0xD9:  # Markers without a length.
             at += 2
         else:
             at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
@@ -80,12 +81,12 @@ def _png_is_cut_short(data: bytes) -> bool:
 
 
 def _webp_is_cut_short(data: bytes) -> bool:
-    """Whether the file is shorter than its RIFF header says."""
+    """Whether the file is shorter than its RIFF header states."""
     return len(data) < 8 + int.from_bytes(data[4:8], "little")
 
 
 def _tiff_is_cut_short(data: bytes) -> bool:
-    """Whether the first directory, or a strip or tile it lists, lies beyond the end."""
+    """Whether the first directory, or a strip or tile in it, ends beyond the file."""
     order: Literal["little", "big"] = "little" if data[:2] == b"II" else "big"
     is_big_tiff = int.from_bytes(data[2:4], order) == 43
     directory = int.from_bytes(data[8:16] if is_big_tiff else data[4:8], order)
@@ -105,7 +106,7 @@ def _tiff_is_cut_short(data: bytes) -> bool:
 
 
 def tiff_size(data: bytes) -> tuple[int, int]:
-    """Width and height in a TIFF's first directory; raises ValueError where it has none."""
+    """Width and height in a TIFF's first directory; raises ValueError if it has none."""
     tags = _tiff_directory(data)
     if 256 not in tags or 257 not in tags:
         raise ValueError("no image size")

@@ -1,4 +1,4 @@
-"""A photo's file -> Photo, or the reason why it is not used."""
+"""A photo's file → Photo, or the reason why it is skipped."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from sfm_front.types import Photo, Skipped, SkipReason
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PhotoReader:
-    """Reads photos: JPEG, PNG, TIFF, BMP and WebP with any kind of pixels.
+    """Reads photos: JPEG, PNG, TIFF, BMP and WebP with any pixel type.
 
     ``max_image_size``: the long side of a photo's pixels is reduced to this, never enlarged.
     ``min_image_size``: files whose short side is below this are skipped. Both in pixels.
-    It keeps nothing between photos and may be used from several threads.
+    Stateless and thread-safe.
     """
 
     max_image_size: int = 1600
@@ -34,7 +34,7 @@ class PhotoReader:
             )
 
     def read(self, path: Path, name: str) -> Photo | Skipped:
-        """Read the photo at ``path``, to be known as ``name``. No file makes this raise."""
+        """Read the photo at ``path`` under the name ``name``. Never raises, whatever the file."""
         data = _content(path, name)
         if isinstance(data, Skipped):
             return data
@@ -46,7 +46,7 @@ class PhotoReader:
                 name,
                 SkipReason.TOO_SMALL,
                 f"{decoded.width} x {decoded.height} pixels, "
-                f"the short side must have {self.min_image_size}",
+                f"the short side must have at least {self.min_image_size}",
             )
         return Photo(
             name=name,
@@ -60,14 +60,14 @@ class PhotoReader:
 
 
 def file_digest(path: Path, name: str) -> str | Skipped:
-    """The digest that a ``Photo`` of this file has, decodable or not. No file makes this raise."""
+    """The ``digest`` of a ``Photo`` of this file, decodable or not. Never raises."""
     data = _content(path, name)
     return data if isinstance(data, Skipped) else _digest(data)
 
 
 def _content(path: Path, name: str) -> bytes | Skipped:
     try:
-        # Opening a pipe would wait for ever, so anything that is no file is refused first.
+        # Opening a pipe could block for ever, so anything but a regular file is refused first.
         if not stat.S_ISREG(path.stat().st_mode):
             return Skipped(name, SkipReason.UNREADABLE, "not a regular file")
         return path.read_bytes()

@@ -1,4 +1,4 @@
-"""A folder -> the photos in it, in order of arrival."""
+"""A folder → its photos, in order of arrival."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def list_photos(folder: Path, *, exclude: Path | None = None) -> list[PhotoPath]
     """Every photo below ``folder``, sub-folders and links to folders included, sorted by name as
     text (``img10`` before ``img2``), as COLMAP sorts them.
 
-    Photos are recognised by extension alone, so that a file that is no image can be reported; other
-    files, and hidden files and folders, are ignored. Nothing below ``exclude`` is listed: an output
-    folder may lie among the photos. Raises InputError if there is no such folder or no photo in it.
+    Photos are recognised by extension alone, so that broken ones can be reported; other files, and
+    hidden files and folders, are ignored. Nothing below ``exclude`` is listed: the output folder
+    may lie among the photos. Raises InputError if the folder is missing or holds no photo.
     """
     if not folder.exists():
         raise InputError(f"{folder}: no such folder. Give the folder that holds the photos.")
@@ -45,7 +45,7 @@ def order_photos(
     photos: Iterable[PhotoPath], order: PhotoOrder = "name", *, seed: int = 0
 ) -> list[PhotoPath]:
     """Photos by ``name``; by ``time`` of capture, then name, those without a time last; or in
-    ``random`` order, determined by ``seed`` alone."""
+    ``random`` order, which depends on ``seed`` alone."""
     if order not in get_args(PhotoOrder):
         raise ConfigError(f"order must be one of {', '.join(get_args(PhotoOrder))}, got {order}")
     by_name = sorted(photos, key=lambda photo: photo.name)

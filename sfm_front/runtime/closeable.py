@@ -1,4 +1,4 @@
-"""What holds threads or files, and is closed by ``with``."""
+"""Objects that hold threads or files and are closed by ``with``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ T = TypeVar("T", bound="Closeable")
 
 
 class Closeable(ABC):
-    """``with`` gives the object itself and closes it at the end, whatever happened."""
+    """``with`` returns the object itself and always closes it at the end."""
 
     @abstractmethod
     def close(self) -> None: ...

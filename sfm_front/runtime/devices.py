@@ -1,4 +1,4 @@
-"""Where networks and matching run: on a GPU where there is one."""
+"""Where networks and matching run: on a GPU if there is one."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ DEVICES = ("auto", "cpu", "cuda")
 
 
 def usable_device(name: str) -> tuple[str, str | None]:
-    """``cpu`` or ``cuda``, and what to tell the user where that is not what was asked for.
+    """``cpu`` or ``cuda``, and a message for the user if that is not what was requested.
 
-    ``auto`` takes a GPU if PyTorch can use one. PyTorch, which takes seconds to load, is not
-    asked where the system has no NVIDIA driver. Raises ConfigError for any other name.
+    ``auto`` is a GPU if PyTorch can use one. PyTorch takes seconds to load, so it is loaded only
+    if there is an NVIDIA driver. Raises ConfigError for any name not in ``DEVICES``.
     """
     if name not in DEVICES:
         raise ConfigError(f"device must be one of {', '.join(DEVICES)}, got {name!r}")

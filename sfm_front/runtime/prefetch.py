@@ -1,4 +1,4 @@
-"""Map a function over items in threads, a bounded number of them ahead of who takes the results."""
+"""Map a function over items in threads, at most a bounded number ahead of the consumer."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Result = TypeVar("Result")
 def prefetch(
     function: Callable[[Item], Result], items: Iterable[Item], *, num_threads: int
 ) -> Generator[Result, None, None]:
-    """Results in the items' order, at most ``2 * num_threads`` of them not yet taken.
+    """Results in the items' order, computed at most ``2 * num_threads`` ahead.
 
-    Until the last one, or until it is closed, matrix products and OpenCV run on the thread that
-    asks for them: split over all cores, they would have the threads wait for each other.
+    Until the generator ends or is closed, matrix products and OpenCV run on the calling thread
+    alone: split over all cores, they would make the threads wait for each other.
     """
     source = iter(items)
     ahead: deque[Future[Result]] = deque()

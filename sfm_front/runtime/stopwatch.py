@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Adds up wall seconds by the name of the stage."""
+    """Adds up wall seconds per stage."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -23,6 +23,6 @@ class Stopwatch:
             self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
 
     def move(self, whole: str, part: str, seconds: float) -> None:
-        """Count seconds that were spent within the stage ``whole`` as the stage ``part``."""
+        """Move ``seconds`` that were spent inside the stage ``whole`` to the stage ``part``."""
         self.seconds[whole] -= seconds
         self.seconds[part] = self.seconds.get(part, 0.0) + seconds

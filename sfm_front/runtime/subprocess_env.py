@@ -1,4 +1,4 @@
-"""What a process that runs a module of this package needs."""
+"""The environment for a process that runs a module of this package."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sfm_front
 
 
 def module_environment() -> dict[str, str]:
-    """This environment, in which ``python -m sfm_front...`` finds the package, installed or not."""
+    """This process's environment, in which ``python -m sfm_front...`` also works uninstalled."""
     environment = dict(os.environ)
     package_root = str(Path(sfm_front.__file__).resolve().parents[1])
     search = [package_root, *filter(None, [environment.get("PYTHONPATH")])]

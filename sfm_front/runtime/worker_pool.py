@@ -1,4 +1,4 @@
-"""A few threads that do the same thing to several items."""
+"""A few threads that map a function over items."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Result = TypeVar("Result")
 
 
 class WorkerPool(Closeable):
-    """Maps a function over items on ``num_threads`` threads; results come in the items' order.
+    """Maps a function over items on ``num_threads`` threads; results are in the items' order.
 
-    While it is open, matrix products and two-view estimates run on the thread that asks for them:
-    split over all cores, they would have the threads wait for each other. That limit is the
-    process's: the last workers to be closed take it away.
+    While a pool is open, matrix products and two-view estimation run on the calling thread alone:
+    split over all cores, they would make the threads wait for each other. The limit holds for the
+    whole process until the last pool is closed.
     """
 
     _lock: ClassVar[Lock] = Lock()
@@ -36,7 +36,7 @@ class WorkerPool(Closeable):
         )
         self._closed = False
         with self._lock:
-            # Again for each: libraries may have been loaded since the last.
+            # Once per pool: more libraries may have been loaded since the last one.
             self._limits.append(threadpool_limits(1))
             WorkerPool._num_open += 1
 

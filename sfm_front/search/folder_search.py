@@ -1,4 +1,4 @@
-"""Search a folder of photos by photo: cosine candidates, re-ranked by verified SIFT matches."""
+"""Search a folder by photo: candidates by cosine, re-ranked by verified SIFT matches."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class SearchOptions:
     """How photos are ranked.
 
     ``method``:
-      ``ours``: those of highest cosine by verified matches of their largest features, then the
-      others by what they and the query look like.
-      ``exhaustive``: all by verified matches of all features, likewise.
-      ``cosine``: all by cosine.
+      ``ours``: the candidates by cosine are re-ranked by verified matches of their largest
+      features; the others follow by global vector.
+      ``exhaustive``: the same, but every photo is a candidate, matched on all features.
+      ``cosine``: by cosine alone.
     """
 
     method: SearchMethod = "ours"
@@ -55,7 +55,7 @@ class SearchOptions:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A photo in an answer; ``inliers`` is None where its matches were not looked at."""
+    """A photo in an answer; ``inliers`` is None if it was not matched."""
 
     photo: PhotoPath
     image_id: int
@@ -67,8 +67,8 @@ class Found:
 class Answer:
     """Photos of the folder, best first.
 
-    ``seconds`` of the ``coarse`` step, to ``read`` the features of the photos it proposed, of the
-    ``fine`` step, and to ``rank`` all others.
+    ``seconds`` by step: ``coarse`` retrieval, ``read`` the candidates' features, ``fine``
+    re-ranking, ``rank`` all others.
     """
 
     query: PhotoPath
@@ -78,8 +78,8 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VerifiedMatches:
-    """Two photos of the same scene: ``xy1`` and ``xy2`` (M, 2) of their verified matches, in
-    pixels of the files, and how many ``tentative`` ones there were."""
+    """The verified matches of two photos: ``xy1`` and ``xy2`` (M, 2) in pixels of the files, and
+    the number of ``tentative`` matches before verification."""
 
     xy1: Float64Array
     xy2: Float64Array
@@ -87,12 +87,12 @@ class VerifiedMatches:
 
 
 class FolderSearch:
-    """Answers queries from an index that is up to date."""
+    """Answers queries from an up-to-date index."""
 
     def __init__(
         self, index: PhotoIndex, options: SearchOptions, workers: WorkerPool, *, device: str = "cpu"
     ) -> None:
-        """``device``: one that ``devices.usable_device`` has given, for matching."""
+        """``device``: where to match, as ``devices.usable_device`` returned it."""
         self._index = index
         self._options = options
         self._workers = workers
@@ -109,7 +109,7 @@ class FolderSearch:
         self._ids = {photo.path.resolve(): image_id for image_id, photo in index.photos.items()}
 
     def ask(self, query: ExtractedPhoto) -> Answer:
-        """Rank the folder's photos. The query, where it is one of them, is not in the answer."""
+        """Rank the folder's photos. The query itself is never in the answer."""
         clock = Stopwatch()
         query_id = self._ids.get(query.path.resolve(), _NOT_INDEXED)
         with clock.stage("coarse"):
@@ -131,14 +131,14 @@ class FolderSearch:
         return Answer(PhotoPath(query.name, query.path), found, clock.seconds)
 
     def _proposed(self, query: ExtractedPhoto, query_id: int) -> list[Candidate]:
-        """The photos to be re-ranked: never the query's own."""
+        """The photos to re-rank, without the query itself."""
         if self._options.method == "cosine":
             return []
         found = self._retriever.candidates(query.global_vector)
         return [c for c in found if c.image_id != query_id][: self._num_candidates]
 
     def verified_matches(self, query: ExtractedPhoto, other: ExtractedPhoto) -> VerifiedMatches:
-        """Match two photos on all features, and verify; no match is left if they are rejected."""
+        """Match two photos on all features and verify; no matches if the pair is rejected."""
         view1, view2 = view_of(1, query), view_of(2, other)
         matches = match_descriptors(
             view1.features.descriptors, view2.features.descriptors, self._matching

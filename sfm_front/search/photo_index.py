@@ -1,4 +1,4 @@
-"""A folder of photos, described on disk once and then kept up with the folder."""
+"""The extracted photos of a folder on disk, kept up to date with the folder."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FILE = "index.json"
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """A file as it was when it was described: unchanged since if path, size and time are."""
+    """A file when it was extracted; the same path, size and time mean an unchanged file."""
 
     path: str
     size: int
@@ -36,10 +36,10 @@ class _Entry:
 
 @dataclass(frozen=True, slots=True)
 class Update:
-    """What it took to bring an index up to date.
+    """What an update of the index did: numbers of photos.
 
-    ``kept`` photos were as before, ``described`` ones are new or changed, ``removed`` ones gone,
-    ``skipped`` ones cannot be used. ``discarded`` says why the index found there was not used.
+    ``kept`` are unchanged, ``described`` new or changed, ``removed`` gone, ``skipped`` unusable.
+    ``discarded`` says why the old index was not used; empty if it was, or there was none.
     """
 
     kept: int
@@ -49,22 +49,22 @@ class Update:
     discarded: str = ""
 
     def __str__(self) -> str:
-        told = f"index: {self.kept} photos as before, {self.described} described"
+        told = f"index: {self.kept} photos unchanged, {self.described} described"
         if self.removed:
             told += f", {self.removed} gone"
         if self.skipped:
             told += f", {len(self.skipped)} skipped"
-        return f"index built anew: {self.discarded}\n{told}" if self.discarded else told
+        return f"index rebuilt: {self.discarded}\n{told}" if self.discarded else told
 
 
 class PhotoIndex(Mapping[int, View]):
-    """The photos of a folder by image id, counted from 1 in the order of their names.
+    """The photos of a folder by image id, counted from 1 in order of name.
 
-    A view is read from disk when it is asked for: a query looks at few of them.
+    Views are read from disk on access: a query needs few of them.
     """
 
     def __init__(self, folder: Path, describer: CachedExtraction) -> None:
-        """``folder``: where the index is, or is to be; ``describer`` keeps its files there too."""
+        """``folder`` holds the index, or will; ``describer`` keeps its files there too."""
         self._file = folder / _FILE
         self._describer = describer
         self.photos: dict[int, PhotoPath] = {}
@@ -77,10 +77,10 @@ class PhotoIndex(Mapping[int, View]):
         num_threads: int,
         progress: Callable[[int], CountLine],
     ) -> Update:
-        """Describe what is new or changed, forget what is gone, and write the index.
+        """Extract new and changed photos, forget missing ones, and write the index.
 
-        ``progress`` makes a line that counts that many photos. Raises InputError where the index
-        cannot be written.
+        ``progress`` is called with the number of photos to extract and returns the line that counts
+        them. Raises InputError if the index cannot be written.
         """
         old, discarded = self._load()
         now = {photo.name: _entry(photo) for photo in photos}
@@ -121,14 +121,14 @@ class PhotoIndex(Mapping[int, View]):
         return vectors[0] if vectors else self.described(image_id).photo.global_vector
 
     def described(self, image_id: int) -> CachedPhoto:
-        """The photo with everything known of it.
+        """The photo with its features and global vector.
 
-        Raises InputError if it has been made unusable since ``update``.
+        Raises InputError if the file has become unusable since ``update``.
         """
         photo = self.photos[image_id]
         described = self._describer.describe(photo, digest=self._digests[image_id])
         if isinstance(described, Skipped):
-            raise InputError(f"{photo.path}: {described}. It was a photo a moment ago: run again.")
+            raise InputError(f"{photo.path}: {described}. It has just changed: run again.")
         return described
 
     def __getitem__(self, image_id: int) -> View:
@@ -145,12 +145,12 @@ class PhotoIndex(Mapping[int, View]):
 
     def _is_complete(self, entry: _Entry) -> bool:
         if entry.skipped:
-            # What could not be read may be readable by now, without having changed.
+            # An unreadable file may have become readable without changing.
             return entry.skipped[0] != SkipReason.UNREADABLE.value
         return self._describer.files.has(self._keys(entry.digest))
 
     def _load(self) -> tuple[dict[str, _Entry], str]:
-        """Entries of the index on disk; or none, and why, where they cannot be used."""
+        """Entries of the index on disk; or none, and why they cannot be used."""
         try:
             content = json.loads(self._file.read_text(encoding="utf-8"))
             if content["format"] != _FORMAT or content["settings"] != self._settings():
@@ -174,12 +174,12 @@ class PhotoIndex(Mapping[int, View]):
         write_json(self._file, content)
 
     def _settings(self) -> Any:
-        # As JSON gives them back: lists for tuples.
+        # As JSON returns them: tuples become lists.
         return json.loads(json.dumps(asdict(self._describer.settings)))
 
 
 def view_of(image_id: int, photo: ExtractedPhoto) -> View:
-    """A described photo as one side of a pair, with a camera of its own."""
+    """An extracted photo as one side of a pair, with its own camera."""
     catalog = CameraCatalog(CameraOptions(mode="per-image"))
     return View(image_id, catalog.camera_for(photo).camera, photo.features)
 
@@ -188,7 +188,7 @@ def _entry(photo: PhotoPath) -> _Entry:
     path = str(photo.path.resolve())
     try:
         status = photo.path.stat()
-    except OSError:  # The describer will say what is wrong with it.
+    except OSError:  # Extraction will report what is wrong.
         return _Entry(path, -1, -1)
     return _Entry(path, status.st_size, status.st_mtime_ns)
 

@@ -12,7 +12,7 @@ from sfm_front.errors import InputError
 
 
 def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Let ``write`` fill a file beside ``path``, then put it in its place; folders are made.
+    """Let ``write`` fill a file beside ``path``, then rename it to ``path``; folders are created.
 
     A reader, a process killed meanwhile, or a power cut leaves what was there before, or all of the
     new.

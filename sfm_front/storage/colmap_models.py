@@ -22,7 +22,7 @@ def is_model(folder: Path) -> bool:
 
 
 def find_models(folder: Path) -> list[Path]:
-    """Every folder at or below ``folder`` that holds a model; ``sparse/2`` before ``sparse/10``."""
+    """All folders at or below ``folder`` that hold a model; ``sparse/2`` before ``sparse/10``."""
     if not folder.is_dir():
         return []
     parents = {file.parent for file in folder.rglob("cameras.*")}
@@ -30,9 +30,9 @@ def find_models(folder: Path) -> list[Path]:
 
 
 def read_model(folder: Path) -> pycolmap.Reconstruction:
-    """Read the model in ``folder``; its binary form where both are there.
+    """Read the model in ``folder``; the binary one if it is there as text too.
 
-    Raises ``InputError`` where the folder is missing, holds no model, or a broken one.
+    Raises ``InputError`` if the folder is missing, or its model is missing or broken.
     """
     if not folder.is_dir():
         raise InputError(
@@ -46,7 +46,7 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
         return pycolmap.Reconstruction(folder)
     except (ValueError, RuntimeError, IndexError, MemoryError) as error:
         first_line = (str(error).splitlines() or ["unreadable"])[0]
-        raise InputError(f"{folder}: broken COLMAP model ({first_line}); write it anew") from error
+        raise InputError(f"{folder}: broken COLMAP model ({first_line}); rebuild it") from error
 
 
 def _by_number(folder: Path) -> list[tuple[int, str]]:

@@ -80,7 +80,7 @@ class PhotoDatabase(Closeable):
     """
 
     def __init__(self, path: Path) -> None:
-        """Open the database at ``path``, or make it."""
+        """Open the database at ``path``, or create it."""
         self._path = path
         self._lock = RLock()
         if not path.exists():
@@ -109,9 +109,9 @@ class PhotoDatabase(Closeable):
         pairs: Sequence[PairGeometry],
         candidates: Sequence[CandidateOutcome] = (),
     ) -> None:
-        """Write a photo with all that is known of it, or nothing of it if this raises.
+        """Write a photo, its camera and its pairs; if this raises, no row of the photo remains.
 
-        Ids are those given: frames have their image's id, rigs their camera's.
+        Ids are those given. A frame has its image's id, a rig its camera's.
         """
         with self._transaction():
             for row in camera_rows(camera):

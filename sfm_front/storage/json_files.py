@@ -1,4 +1,4 @@
-"""JSON for people to read, too: an indented line a value, letters as they are."""
+"""JSON that people can read too: one indented line per value, letters unescaped."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from sfm_front.storage.atomic import write_atomically
 
 
 def as_json(content: object) -> str:
-    """Paths are written as their text. Raises TypeError for what is neither JSON nor a path."""
+    """JSON text; paths become strings. Raises TypeError for what is neither JSON nor a path."""
     return json.dumps(content, ensure_ascii=False, indent=1, default=os.fspath)
 
 
 def write_json(path: Path, content: object) -> None:
-    """Write a file in UTF-8, whole or not at all; folders are made.
+    """Write a file in UTF-8, whole or not at all; folders are created.
 
-    Raises InputError where it cannot be written.
+    Raises InputError if it cannot be written.
     """
-    # A file's name may hold bytes that are no UTF-8; JSON has the same escape for them as Python.
+    # File names may hold bytes that are not UTF-8; Python's escape for them is valid JSON.
     data = f"{as_json(content)}\n".encode(errors="backslashreplace")
     write_atomically(path, lambda file: file.write(data))

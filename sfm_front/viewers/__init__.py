@@ -10,10 +10,10 @@ from sfm_front.viewers.options import DrawOptions
 
 
 def view(model: Path, options: DrawOptions | None = None) -> None:
-    """Open a window on the COLMAP model in folder ``model``; return when it is closed.
+    """Show the COLMAP model in folder ``model`` in a window; return when it is closed.
 
-    Raises ``InputError`` for a folder without a model that can be drawn, ``DependencyError``
-    where Open3D cannot load or there is no screen.
+    Raises ``InputError`` if the folder holds no model that can be drawn, ``DependencyError``
+    if Open3D cannot load or there is no screen.
     """
     from sfm_front.viewers.open3d_window import show
 
@@ -24,8 +24,8 @@ def view(model: Path, options: DrawOptions | None = None) -> None:
 def screenshot(model: Path, out: Path, options: DrawOptions | None = None) -> None:
     """Draw the COLMAP model in folder ``model`` to the PNG ``out``; needs no screen.
 
-    Raises ``InputError`` for a folder without a model that can be drawn or a file that cannot
-    be written, ``DependencyError`` where Open3D cannot load or has no driver to draw with.
+    Raises ``InputError`` if the folder holds no model that can be drawn or ``out`` cannot be
+    written, ``DependencyError`` if Open3D cannot load or has no driver to draw with.
     """
     from sfm_front.viewers.offscreen import render_png
 

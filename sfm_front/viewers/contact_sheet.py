@@ -1,4 +1,4 @@
-"""Answers of a photo search as one picture: the query, then the best photos in their order."""
+"""Search answers as one picture: each query, then the best photos in order."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sfm_front.viewers.pictures import (
 
 COLUMNS = 5
 SHOWN = 2 * COLUMNS
-"""Photos shown of an answer."""
+"""Photos shown per answer."""
 
 _CELL = (264, 198)
 _QUERY = (396, 297)
@@ -36,7 +36,7 @@ _THIN, _THICK = 1, 5
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """A photo with its name and a line of detail; ``wrong`` is framed red."""
+    """A photo with its name and a line of detail; framed red if ``wrong``."""
 
     path: Path
     name: str
@@ -53,7 +53,7 @@ class SheetRow:
 
 
 def contact_sheet(rows: Sequence[SheetRow]) -> Image.Image:
-    """Each query on the left, half as large again, and its ten best beside it in two lines."""
+    """Each query on the left, at 1.5 times the size, with its ten best beside it in two rows."""
     step_x, step_y = _CELL[0] + _GAP, _CELL[1] + _CAPTION
     first_x = _MARGIN + _QUERY[0] + 2 * _GAP
     row_height = 2 * step_y + _GAP
@@ -81,7 +81,7 @@ def _draw_tile(
     size: tuple[int, int],
     frame: tuple[Color, int],
 ) -> None:
-    """The whole photo, as large as it fits above its caption, at the bottom of its cell."""
+    """Draw the whole photo at the bottom of its cell, as large as fits, with its caption below."""
     color, thickness = frame
     photo = load(tile.path, max(size))
     room = size[0] - 2 * thickness, size[1] - 2 * thickness

@@ -14,7 +14,7 @@ from sfm_front.types import Float64Array, Uint8Array
 from sfm_front.viewers.pictures import BACKGROUND, INK, load, write
 
 HEIGHT = 900
-"""Of the photos in pixels."""
+"""Height of both photos in pixels, less if one would become too wide."""
 
 _LARGEST_WIDTH = 1400
 _GAP = 12
@@ -23,9 +23,9 @@ _CAPTION = 52
 _TEXT_SIZE = 24
 _LINE_OPACITY = 0.7
 MOST_LINES = 200
-"""Beyond this many matches the photos would vanish behind them."""
+"""More lines than this would hide the photos."""
 
-# Points are drawn to a fraction of a pixel: OpenCV takes fixed-point numbers.
+# OpenCV draws at sub-pixel positions given as fixed-point numbers.
 _SHIFT_BITS = 4
 _OUTLIER = (150, 150, 150)
 
@@ -39,7 +39,7 @@ def draw_matches(
     caption: str,
     is_inlier: NDArray[np.bool_] | None = None,
 ) -> Image.Image:
-    """``xy1``, ``xy2`` (M, 2): where each match is, in pixels of files of these (width, height).
+    """Draw M matches, at ``xy1``, ``xy2`` (M, 2) in pixels of files of ``sizes`` (width, height).
 
     Every match has a circle in both photos, and a line where there are ``MOST_LINES`` or fewer;
     else an even share of them, from top to bottom, has lines, and the caption says so. Lines are
@@ -56,7 +56,7 @@ def draw_matches(
     for photo, offset in zip(photos, offsets, strict=True):
         canvas.paste(photo, offset)
     ends = [
-        # From pixels whose corner is (0, 0) to OpenCV's, whose centre is.
+        # (0, 0) is the corner of COLMAP's first pixel, but the centre of OpenCV's.
         xy * (photo.width / size[0], photo.height / size[1]) + offset - 0.5
         for xy, photo, size, offset in zip((xy1, xy2), photos, sizes, offsets, strict=True)
     ]
@@ -123,6 +123,6 @@ def _even_share(count: int) -> NDArray[np.int64]:
 
 
 def _color(share: float) -> tuple[int, int, int]:
-    """Red at the top to violet at the bottom, RGB."""
+    """RGB, from red at the top to violet at the bottom."""
     red, green, blue = colorsys.hsv_to_rgb(0.8 * min(max(share, 0.0), 1.0), 0.9, 1.0)
     return round(255 * red), round(255 * green), round(255 * blue)

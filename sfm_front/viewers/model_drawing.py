@@ -1,4 +1,4 @@
-"""Turn a COLMAP model into what is drawn: coloured points, camera frusta, a view."""
+"""A COLMAP model → what is drawn: coloured points, camera frusta, a view."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from sfm_front.viewers.viewpoint import View, choose_view
 if TYPE_CHECKING:
     import pycolmap
 
-#: Points further outside than this many extents of the middle 98 % are not drawn.
+#: Points farther outside the middle 98 % than this, in diagonals of their box, are not drawn.
 _KEPT_EXTENTS = 1.0
 _MIDDLE_PERCENTILES = (1.0, 99.0)
 
-#: Diagonal of a frustum's base: this part of the gap to the nearest camera, but no less and no
-#: more than these parts of the scene's diagonal.
+#: Diagonal of a frustum's base: this fraction of the distance to the nearest camera, within these
+#: fractions of the scene's diagonal.
 _FRUSTUM_PER_GAP = 0.6
 _FRUSTUM_PER_DIAGONAL = (0.01, 0.035)
 
-#: First photo to last: blue, teal, yellow, red; even in brightness on dark and on white.
+#: First photo to last: blue, teal, yellow, red; visible on dark and on white.
 _SEQUENCE_COLORS = np.array(
     [[0.20, 0.47, 0.96], [0.06, 0.72, 0.65], [0.95, 0.70, 0.10], [0.93, 0.25, 0.22]]
 )
 
-#: A frustum's lines between its five vertices: apex, then corners clockwise from the top left.
+#: A frustum's edges between its five vertices: apex, then corners clockwise from the top left.
 _FRUSTUM_LINES = np.array(
     [[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]], dtype=np.int32
 )
@@ -40,9 +40,9 @@ _FRUSTUM_LINES = np.array(
 class Scene:
     """What is drawn, in world coordinates; colours are RGB in [0, 1].
 
-    ``points`` and ``point_colors`` (N, 3) float64; ``vertices`` (5 K, 3) float64, ``lines``
-    (8 K, 2) int32 into them and ``line_colors`` (8 K, 3) float64 are the frusta of K cameras in
-    the order of their photos.
+    ``points`` and ``point_colors`` are (N, 3) float64. The frusta of K cameras, in the order of
+    their photos: ``vertices`` (5 K, 3) float64, ``lines`` (8 K, 2) int32 indices into them,
+    ``line_colors`` (8 K, 3) float64.
     """
 
     points: Float64Array
@@ -57,7 +57,7 @@ class Scene:
 def build_scene(model: pycolmap.Reconstruction, options: DrawOptions | None = None) -> Scene:
     """Everything a viewer needs of ``model``.
 
-    Raises ``InputError`` where no photo of the model has a pose.
+    Raises ``InputError`` if no photo of the model has a pose.
     """
     options = options or DrawOptions()
     images = [model.images[image_id] for image_id in sorted(model.reg_image_ids())]
@@ -88,7 +88,7 @@ def build_scene(model: pycolmap.Reconstruction, options: DrawOptions | None = No
 
 
 def sequence_colors(count: int) -> Float64Array:
-    """(count, 3) float64: one colour a photo, running through the sequence."""
+    """(count, 3) float64: one colour per photo, running through the sequence."""
     stops = np.linspace(0.0, 1.0, len(_SEQUENCE_COLORS))
     at = np.linspace(0.0, 1.0, count)
     return np.stack([np.interp(at, stops, channel) for channel in _SEQUENCE_COLORS.T], axis=1)
@@ -97,7 +97,7 @@ def sequence_colors(count: int) -> Float64Array:
 def _points(
     model: pycolmap.Reconstruction, centres: Float64Array, grey: float
 ) -> tuple[Float64Array, Float64Array]:
-    """Coordinates and colours without far outliers; ``grey`` where the model has no colours."""
+    """Coordinates and colours without far outliers; ``grey`` if the model has no colours."""
     seen = [point for _, point in sorted(model.points3D.items())]
     points = np.array([point.xyz for point in seen]).reshape(-1, 3)
     colors = np.array([point.color for point in seen]).reshape(-1, 3) / 255.0
@@ -114,7 +114,7 @@ def _points(
 
 
 def _frustum(camera: pycolmap.Camera) -> Float64Array:
-    """(5, 3) in camera coordinates, with a base of diagonal 1 at any focal length.
+    """(5, 3) in camera coordinates; its base has diagonal 1 at any focal length.
 
     Distortion and an off-centre principal point are not drawn.
     """
@@ -125,7 +125,7 @@ def _frustum(camera: pycolmap.Camera) -> Float64Array:
 
 
 def _frustum_size(points: Float64Array, centres: Float64Array) -> float:
-    """Small beside the scene, and such that neighbours in a sequence do not cover each other."""
+    """Small compared to the scene, and such that neighbours in a sequence do not overlap."""
     everything = np.concatenate([points, centres])
     low, high = np.percentile(everything, _MIDDLE_PERCENTILES, axis=0)
     diagonal = float(np.linalg.norm(high - low)) or 1.0
@@ -137,7 +137,7 @@ def _frustum_size(points: Float64Array, centres: Float64Array) -> float:
 
 
 def _point_size(count: int, options: DrawOptions) -> float:
-    """Sparse clouds get larger points, so that a scene looks equally dense at any size."""
+    """Larger points for sparser clouds, so that scenes look equally dense at any size."""
     area_per_point = options.width * options.height / max(count, 1)
     size = np.clip(0.3 * np.sqrt(area_per_point), 2.0, 6.0) * options.height / 1000
     return max(float(size), 1.5)

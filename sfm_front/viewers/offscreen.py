@@ -1,7 +1,7 @@
 """Draw a scene to a PNG without a screen.
 
-Open3D draws in a process of its own: where the machine has no driver to draw with, Filament,
-its renderer, aborts the process rather than raise, and it prints to standard output.
+Open3D runs in its own process: without a driver, its renderer Filament aborts the process instead
+of raising, and it prints to standard output.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _TIMEOUT_S = 300.0
 
 
 def render_png(scene: Scene, options: DrawOptions, out: Path) -> None:
-    """Write ``scene`` to ``out`` as a PNG; its folder is made where it is missing.
+    """Write ``scene`` to ``out`` as a PNG; its folder is created.
 
-    Raises ``DependencyError`` where Open3D cannot load or has nothing to draw with, and
-    ``InputError`` where ``out`` cannot be written.
+    Raises ``DependencyError`` if Open3D cannot load or has no driver to draw with, and
+    ``InputError`` if ``out`` cannot be written.
     """
     with TemporaryDirectory(prefix="sfm_front_view_") as folder:
         drawing, picture = Path(folder) / "drawing.npz", Path(folder) / "picture.png"
@@ -54,7 +54,7 @@ def render_png(scene: Scene, options: DrawOptions, out: Path) -> None:
             out.parent.mkdir(parents=True, exist_ok=True)
             out.write_bytes(picture.read_bytes())
         except OSError as error:
-            raise InputError(f"{out}: cannot write it ({error.strerror})") from error
+            raise InputError(f"{out}: cannot be written ({error.strerror})") from error
 
 
 def _draw(drawing: Path, picture: Path) -> None:
@@ -69,7 +69,7 @@ def _draw(drawing: Path, picture: Path) -> None:
         )
     except subprocess.TimeoutExpired as error:
         raise DependencyError(
-            f"open3d drew for {_TIMEOUT_S:.0f} s without a picture; try a smaller --size"
+            f"open3d drew no picture in {_TIMEOUT_S:.0f} s; try a smaller --size"
         ) from error
     if done.returncode == CANNOT_LOAD:
         raise DependencyError(done.stderr.strip().splitlines()[-1])
@@ -80,7 +80,7 @@ def _draw(drawing: Path, picture: Path) -> None:
 
 
 def _environment() -> dict[str, str]:
-    """One in which EGL does not look for a screen."""
+    """An environment in which EGL does not look for a screen."""
     environment = module_environment()
     environment["EGL_PLATFORM"] = environment.get("EGL_PLATFORM") or "surfaceless"
     return environment

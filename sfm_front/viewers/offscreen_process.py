@@ -13,13 +13,13 @@ from sfm_front.errors import DependencyError
 from sfm_front.viewers.offscreen import CANNOT_LOAD
 from sfm_front.viewers.open3d_loader import load_open3d
 
-#: Drawn this much larger and reduced: smooth points and lines on any driver.
+#: Drawn larger by this factor, then reduced: smooth points and lines on any driver.
 _OVERSAMPLING = 2
 _LINE_WIDTH_PX = 1.5
 
 
 def main(drawing: Path, picture: Path) -> int:
-    """Draw the arrays of ``drawing``; exit status ``CANNOT_LOAD`` where Open3D does not load."""
+    """Draw the arrays of ``drawing``; exit status ``CANNOT_LOAD`` if Open3D does not load."""
     try:
         o3d = load_open3d()
     except DependencyError as error:
@@ -39,7 +39,7 @@ def _render(o3d: Any, arrays: dict[str, Any]) -> Any:
     )
     scene = renderer.scene
     scene.view.set_post_processing(False)  # tone mapping would change the colours
-    # Without it the background, and nothing else, is taken for sRGB and shown as linear values.
+    # The renderer takes the background, and nothing else, for sRGB and converts it to linear.
     scene.set_background([*_srgb_from_linear(arrays["background"]), 1.0])
 
     if len(arrays["points"]):

@@ -16,8 +16,8 @@ INSTALL_HINT = f"on Debian or Ubuntu: apt-get install {SYSTEM_PACKAGES}"
 def load_open3d() -> Any:
     """The open3d module.
 
-    Raises ``DependencyError``, one line, where it is not installed or a system library that it
-    is linked against is missing.
+    Raises ``DependencyError``, in one line, if it is not installed or a system library that it
+    links to is missing.
     """
     try:
         return import_module("open3d")

@@ -19,9 +19,9 @@ from sfm_front.viewers.viewpoint import VERTICAL_FIELD_OF_VIEW_DEG, View
 def show(scene: Scene, options: DrawOptions, title: str) -> None:
     """Open a window and return when it is closed.
 
-    Raises ``DependencyError`` where Open3D cannot load or there is no screen.
+    Raises ``DependencyError`` if Open3D cannot load or there is no screen.
     """
-    # Without a screen, Open3D would open a window that nobody sees and wait for it to be closed.
+    # Without a screen, Open3D would open an invisible window and wait for it to be closed.
     if not _has_screen():
         raise DependencyError("no screen to open a window on; use --screenshot FILE.png instead")
     o3d = load_open3d()
@@ -45,13 +45,13 @@ def show(scene: Scene, options: DrawOptions, title: str) -> None:
 
 
 def _has_screen() -> bool:
-    """Whether a window can be opened; on Linux, whether a Wayland or X server answers."""
+    """Whether a window can be opened; on Linux, whether there is a Wayland or X server."""
     if not sys.platform.startswith("linux") or os.environ.get("WAYLAND_DISPLAY"):
         return True
     try:
         x11 = ctypes.CDLL("libX11.so.6")
     except OSError:
-        return True  # Open3D cannot load without it either, and will name it
+        return True  # Open3D needs this library too, and names it when it fails to load
     x11.XOpenDisplay.restype = ctypes.c_void_p
     display = x11.XOpenDisplay(None)
     if not display:
@@ -72,7 +72,7 @@ def _geometries(o3d: Any, scene: Scene) -> list[Any]:
 
 
 def _pinhole(o3d: Any, view: View, options: DrawOptions) -> Any:
-    """The view as Open3D's pinhole camera: extrinsic is 4 x 4, camera from world."""
+    """The view as Open3D's pinhole camera; its extrinsic is 4 x 4, camera from world."""
     focal = 0.5 * options.height / np.tan(np.radians(VERTICAL_FIELD_OF_VIEW_DEG) / 2)
     forward = (view.target - view.eye) / np.linalg.norm(view.target - view.eye)
     right = np.cross(forward, view.up)
@@ -80,7 +80,7 @@ def _pinhole(o3d: Any, view: View, options: DrawOptions) -> Any:
     cam_from_world[:3, :3] = [right, np.cross(forward, right), forward]
     cam_from_world[:3, 3] = -cam_from_world[:3, :3] @ view.eye
     parameters = o3d.camera.PinholeCameraParameters()
-    # The legacy viewer takes only this principal point.
+    # The legacy viewer accepts only this principal point.
     parameters.intrinsic = o3d.camera.PinholeCameraIntrinsic(
         options.width,
         options.height,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
 
-#: Background and, for points without a colour of their own, a grey that stands out from it.
+#: Background colour, and the grey of points if the model has no colours.
 BACKGROUNDS: dict[str, tuple[tuple[float, float, float], float]] = {
     "dark": ((0.055, 0.065, 0.085), 0.75),
     "white": ((1.0, 1.0, 1.0), 0.45),
@@ -18,9 +18,8 @@ _LARGEST_POINT_PX = 50.0
 
 @dataclass(frozen=True, kw_only=True)
 class DrawOptions:
-    """Size of the picture and of its points in pixels; ``point_size_px`` None follows the scene.
-
-    ``background`` is a key of ``BACKGROUNDS``; colours are RGB in [0, 1].
+    """Size of the picture and of its points in pixels; by default the number of points sets
+    ``point_size_px``. ``background`` is a key of ``BACKGROUNDS``, whose colours are RGB in [0, 1].
     """
 
     width: int = 1600

@@ -1,4 +1,4 @@
-"""What pictures of photos share: thumbnails, text, and writing the file."""
+"""What pictures of photos share: thumbnails, text, writing the file."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _PICTURE_SUFFIXES = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
 
 
 def load(path: Path, max_size: int) -> Image.Image:
-    """The photo at ``path``, its long side at most ``max_size``, as stored; a grey square with
-    the reason where it cannot be read."""
+    """The photo at ``path``, as stored, its long side at most ``max_size`` pixels; if it cannot
+    be read, a grey square with the reason."""
     photo = PhotoReader(max_image_size=max_size, min_image_size=1).read(path, path.name)
     if not isinstance(photo, Skipped):
         return Image.fromarray(photo.pixels)
@@ -48,9 +48,9 @@ def write(
     width: int,
     anchor: str,
 ) -> None:
-    """Write ``text`` at a point that is its ``anchor``, as Pillow names anchors.
+    """Write ``text`` with its ``anchor``, in Pillow's notation, at the point ``at``.
 
-    Where it would be wider than ``width`` pixels, its middle is left out.
+    If it is wider than ``width`` pixels, its middle is left out.
     """
     font = _font(text, size)
     if font is None:
@@ -60,7 +60,7 @@ def write(
 
 
 def shortened(text: str, width: int, font: Font) -> str:
-    """``text`` with its middle left out so far that it fits ``width`` pixels."""
+    """``text``, with as much of its middle left out as it takes to fit ``width`` pixels."""
     if font.getlength(text) <= width:
         return text
     for kept in range(len(text) - 1, 1, -1):
@@ -81,18 +81,18 @@ def _system_font(size: int) -> Font | None:
 
 
 def _font(text: str, size: int) -> Font | None:
-    """Pillow's own font, which knows ASCII alone, or the system's; None where that has none."""
+    """Pillow's own font for ASCII text, else a system font; None if the system has none."""
     return ImageFont.load_default(size) if text.isascii() else _system_font(size)
 
 
 def check_picture(path: Path) -> None:
-    """Raises InputError if ``save`` knows no format of this name."""
+    """Raises InputError if ``save`` cannot write this file type."""
     if path.suffix.lower() not in _PICTURE_SUFFIXES:
         raise InputError(f"{path}: pictures are written as {', '.join(_PICTURE_SUFFIXES)}")
 
 
 def save(picture: Image.Image, path: Path) -> None:
-    """Write a PNG or JPEG by the name's ending. Raises InputError where it cannot be written."""
+    """Write a PNG or JPEG, by extension. Raises InputError if it cannot be written."""
     check_picture(path)
     kind = _PICTURE_SUFFIXES[path.suffix.lower()]
     options = {"quality": 92} if kind == "JPEG" else {}

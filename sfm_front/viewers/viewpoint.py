@@ -1,4 +1,4 @@
-"""Choose where to look at a model from: obliquely, from behind and above its cameras."""
+"""Choose a viewpoint for a model: oblique, from behind and above its cameras."""
 
 from __future__ import annotations
 
@@ -10,23 +10,24 @@ from sfm_front.types import Float64Array
 
 VERTICAL_FIELD_OF_VIEW_DEG = 45.0
 
-#: Below this length of their mean, unit vectors do not agree. Of a camera's forward and top one
-#: is always longer than it when levelled, so that the search for a heading ends.
+#: Unit vectors agree if their mean is longer than this. Projected onto the horizon, a camera's
+#: forward or its top always is, so that the search for a heading ends.
 _AGREEMENT = 0.4
-#: A plane's third extent against its second, a line's second against its first.
+#: Extents below this ratio to the next larger one are flat: the third of a plane, the second of a
+#: line.
 _FLAT = 0.25
 _AZIMUTH_DEG = 28.0
 _ELEVATION_DEG = 30.0
-#: The part of the half picture that the scene may fill.
+#: The fraction of the picture that the scene may fill.
 _FILL = 0.95
-#: What stands out beyond these percentiles of the projected points may leave the picture.
+#: Projected points outside these percentiles may lie outside the picture.
 _FRAME_PERCENTILES = (2.0, 98.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
     """A virtual camera in world coordinates: it stands at ``eye``, looks at ``target``, and
-    ``up`` is upwards in its picture. Each (3,) float64; ``up`` has length one."""
+    ``up`` points upwards in its picture. Each (3,) float64; ``up`` has length 1."""
 
     eye: Float64Array
     target: Float64Array
@@ -40,11 +41,11 @@ def choose_view(
     centres: Float64Array,
     aspect: float,
 ) -> View:
-    """The view that holds the scene and its cameras.
+    """A view of the whole scene with its cameras.
 
-    ``points`` (N, 3) are the model's, ``camera_points`` (M, 3) the corners of the drawn frusta,
+    ``points`` (N, 3) are the model's; ``camera_points`` (M, 3) are the corners of the drawn frusta,
     all of which stay inside; ``world_from_cam`` (K, 3, 3) are rotations in COLMAP's convention
-    (x right, y down, z forward) and ``centres`` (K, 3) the cameras' positions, K at least 1;
+    (x right, y down, z forward) and ``centres`` (K, 3) the projection centres, K at least 1;
     ``aspect`` is width over height.
     """
     up = upward(world_from_cam, centres)
@@ -64,12 +65,12 @@ def choose_view(
 
 
 def upward(world_from_cam: Float64Array, centres: Float64Array) -> Float64Array:
-    """The world's up, as far as cameras tell (unit length).
+    """The world's up direction, estimated from the cameras (unit length).
 
-    People walk, cars drive and drones fly level: cameras spread over a plane give its normal, on
-    the side that their pictures' tops and their backs point to. Otherwise up is the mean of the
-    pictures' upward directions or, where these cancel out (a drone that flies to and fro and
-    looks down), the opposite of the mean viewing direction.
+    People walk, cars drive and drones fly level: if the centres lie in a plane, up is its normal,
+    on the side of the pictures' tops and the cameras' backs. Otherwise it is the mean of the
+    pictures' upward directions or, if these cancel out (a drone that flies to and fro and looks
+    down), the opposite of the mean viewing direction.
     """
     tops, backs = -world_from_cam[:, :, 1], -world_from_cam[:, :, 2]
     offsets = centres - centres.mean(axis=0)
@@ -86,10 +87,10 @@ def upward(world_from_cam: Float64Array, centres: Float64Array) -> Float64Array:
 
 
 def _viewing_direction(world_from_cam: Float64Array, up: Float64Array) -> Float64Array:
-    """From ``_ELEVATION_DEG`` above the horizon and ``_AZIMUTH_DEG`` beside the cameras' heading.
+    """From ``_ELEVATION_DEG`` above the horizon, ``_AZIMUTH_DEG`` off the cameras' heading.
 
-    The heading is where they look; cameras that look straight down, or that circle an object,
-    have none in common: then it is where the tops of their pictures point, or the first one's.
+    The heading is their mean viewing direction. Cameras that look straight down or circle an
+    object have none: then it is where the tops of their pictures point, or the first camera's.
     """
     forwards, tops = world_from_cam[:, :, 2], -world_from_cam[:, :, 1]
     choices = [forwards.mean(axis=0), tops.mean(axis=0), forwards[0], tops[0]]
@@ -104,8 +105,8 @@ def _viewing_direction(world_from_cam: Float64Array, up: Float64Array) -> Float6
 def _fit(points: Float64Array, aspect: float) -> tuple[Float64Array, float]:
     """Centre and distance at which ``points`` (N, 3: right, up, towards the viewer) fill the frame.
 
-    The nearest distance for a centre is exact; the centre is then moved to even out the margins,
-    which a few rounds settle.
+    The smallest distance for a centre is exact; the centre is moved until the margins are even,
+    which takes a few rounds.
     """
     half_height = np.tan(np.radians(VERTICAL_FIELD_OF_VIEW_DEG) / 2) * _FILL
     half = np.array([half_height * aspect, half_height])
@@ -118,7 +119,8 @@ def _fit(points: Float64Array, aspect: float) -> tuple[Float64Array, float]:
 
 
 def _distance(offset: Float64Array, half: Float64Array) -> float:
-    """The least distance at which no ``offset``, right or up, exceeds ``half`` of its depth."""
+    """The smallest distance at which all of ``offset`` (N, 3) is within ``half``, the tangents of
+    the half fields of view."""
     return max(float((np.abs(offset[:, :2]) / half + offset[:, 2:]).max()), 1e-6)
 
 

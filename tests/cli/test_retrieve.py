@@ -62,7 +62,7 @@ def test_the_index_is_used_again(world, capsys):
     retrieve(world)
     capsys.readouterr()
     retrieve(world)
-    assert "index: 6 photos as before, 0 described, 1 skipped" in capsys.readouterr().err
+    assert "index: 6 photos unchanged, 0 described, 1 skipped" in capsys.readouterr().err
 
 
 def test_json_takes_the_tables_place(world, capsys):
@@ -128,7 +128,7 @@ def test_photos_that_are_added_are_found(tmp_path, capsys):
     assert retrieve(tmp_path, "--json") == 0
     out, err = capsys.readouterr()
     assert {row["name"] for row in json.loads(out)[:2]} == {"2_0.png", "2_60.png"}
-    assert "2 photos as before, 1 described" in err
+    assert "2 photos unchanged, 1 described" in err
 
 
 def test_nothing_is_written_to_the_photos_folder(tmp_path, monkeypatch):

@@ -124,7 +124,7 @@ def test_photos_from_one_place_are_judged_by_rotation_alone():
 
 def test_names_that_differ_in_case_alone_are_refused():
     pose = looking([0, 0, 0], [0, 1, 0], UP)
-    with pytest.raises(InputError, match="but for the case"):
+    with pytest.raises(InputError, match="ignoring case"):
         pose_errors(make_model({"a.jpg": pose, "A.jpg": pose}), [])
 
 

@@ -1,1 +1,1 @@
-"""Scenes, photos and models that tests are made with."""
+"""Scenes, photos and models for tests."""

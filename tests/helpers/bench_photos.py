@@ -41,7 +41,7 @@ def query(
     relevant: Iterable[str],
     box: tuple[float, float, float, float] | None = None,
 ) -> Query:
-    """A query whose own photo does not count."""
+    """A query that ignores its own photo."""
     return Query(name, photo, frozenset(relevant), frozenset([photo]), box)
 
 
@@ -62,7 +62,7 @@ def small_dataset(folder: Path) -> Dataset:
 
 
 class ByNumber:
-    """Answers by a given table; every query takes its time."""
+    """Answers from a given table; every query takes at least 10 ms."""
 
     name = "by number"
     global_vectors = ()

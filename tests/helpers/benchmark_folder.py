@@ -18,14 +18,14 @@ CAMERAS = {f"{i}.jpg": looking([i, 0, 0], [0, 1, 0], [0, 0, 1]) for i in range(4
 
 
 def write_model(folder: Path, cameras: Mapping[str, pycolmap.Rigid3d]) -> Path:
-    """A model of these photos in a new folder, which it returns."""
+    """Write a model of these photos to a new folder; returns the folder."""
     folder.mkdir(parents=True)
     make_model(cameras).write(folder)
     return folder
 
 
 def noise_photos(folder: Path) -> Path:
-    """Four photos of noise: they have features, and nothing in common. Returns the folder."""
+    """Write four photos of noise, with features but nothing in common; returns their folder."""
     folder.mkdir(parents=True)
     for i, name in enumerate(CAMERAS):
         coarse = np.random.default_rng(i).integers(0, 255, (15, 20, 3), dtype=np.uint8)
@@ -62,7 +62,7 @@ write_report(output, RunSummary(photos, (), {{}}, (), totals))
 
 
 def fake_command(folder: Path) -> list[str]:
-    """A command that reconstructs nothing and reports as ours does."""
+    """A command that writes models and a report as ``reconstruct`` does, from no photos."""
     script = folder / "fake.py"
     script.write_text(FAKE.format(tests=str(Path(__file__).parents[1])))
     return [sys.executable, str(script)]

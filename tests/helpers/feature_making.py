@@ -1,4 +1,4 @@
-"""Features of no photo: random descriptors at random places."""
+"""Random features: descriptors and places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Image files of a small scene in every format, and reading them, for tests."""
+"""Write a small scene in every image format and read it back, for tests."""
 
 from __future__ import annotations
 

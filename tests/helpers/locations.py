@@ -1,4 +1,4 @@
-"""Where things are."""
+"""Folders of the repository and of test data."""
 
 from __future__ import annotations
 

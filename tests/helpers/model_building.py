@@ -24,7 +24,7 @@ def make_model(
     points: np.ndarray | None = None,
     colors: np.ndarray | None = None,
 ) -> pycolmap.Reconstruction:
-    """A model of the named photos in their order, all of one camera; nobody sees its points."""
+    """A model of the named photos in order, with one camera; its points have no observations."""
     model = pycolmap.Reconstruction()
     camera = pycolmap.Camera(
         camera_id=1,
@@ -45,7 +45,7 @@ def make_model(
 
 
 def model_of(seen_by: Sequence[Sequence[str]]) -> pycolmap.Reconstruction:
-    """A model with a point for each of ``seen_by``, which names the photos that see it."""
+    """A model with one point for each of ``seen_by``, the names of the photos that observe it."""
     names = sorted({name for photo in seen_by for name in photo})
     cameras = {name: looking([i, 0, 0], [0, 1, 0], [0, 0, 1]) for i, name in enumerate(names)}
     model = make_model(cameras)

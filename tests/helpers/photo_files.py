@@ -1,4 +1,4 @@
-"""Small photo files of scenes with texture, for tests."""
+"""Small photo files of textured scenes, for tests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ WIDTH, HEIGHT = 320, 240
 
 
 def scene(seed: int) -> Image.Image:
-    """A picture of 460 x 340 with texture at several scales; another one for another seed."""
+    """A picture of 460 x 340 with texture at several scales, different for each seed."""
     rng = np.random.default_rng(seed)
     total = np.zeros((340, 460, 3))
     for cells, strength in ((12, 1.0), (30, 0.9), (80, 0.7)):
@@ -28,7 +28,7 @@ def photo(seed: int, shift: int) -> Image.Image:
 
 
 def save(folder: Path, *names: str) -> list[Path]:
-    """Photos called ``SEED_SHIFT.png``, showing just that."""
+    """Save the photos named ``SEED_SHIFT.png``; returns their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name in names:

@@ -1,4 +1,4 @@
-"""Photos of synthetic scenes, in the form in which they go through a session, for tests."""
+"""Photos of synthetic scenes, in the form a session handles them, for tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _VLAD = Vlad()
 
 
 def described(scene: SyntheticScene, index: int, *, prefix: str = "") -> ExtractedPhoto:
-    """Photo ``index`` as if it had been read and described."""
+    """Photo ``index`` as if it had been read and extracted."""
     photo = scene.photo(index)
     named = replace(photo, name=prefix + photo.name)
     return as_described(named, scene.camera, _VLAD.describe(photo.features))
@@ -31,7 +31,7 @@ def view_of(scene: SyntheticScene, index: int, image_id: int) -> View:
 
 
 def true_matches(scene: SyntheticScene, first: int, second: int) -> np.ndarray:
-    """(M, 2) uint32: keypoints of two photos that show the same scene point."""
+    """(M, 2) uint32: indices of keypoints of two photos that show the same scene point."""
     ids = [scene.photo(index).point_ids for index in (first, second)]
     shown = [np.flatnonzero(of_photo >= 0) for of_photo in ids]
     _, in_first, in_second = np.intersect1d(
@@ -41,7 +41,7 @@ def true_matches(scene: SyntheticScene, first: int, second: int) -> np.ndarray:
 
 
 def true_pair(scene: SyntheticScene, first: int, second: int, ids: tuple[int, int]) -> PairGeometry:
-    """The pair as verification finds it where nothing goes wrong."""
+    """The pair as perfect verification returns it."""
     matches = true_matches(scene, first, second)
     poses = [scene.cams_from_world[index] for index in (first, second)]
     points = scene.points[scene.photo(first).point_ids[matches[:, 0]]]
@@ -61,7 +61,7 @@ def true_pair(scene: SyntheticScene, first: int, second: int, ids: tuple[int, in
 
 
 def centre_of(cam_from_world: pycolmap.Rigid3d) -> Float64Array:
-    """(3,) projection centre in the world."""
+    """Projection centre, (3,), in world coordinates."""
     return np.asarray(cam_from_world.inverse().translation)
 
 
@@ -81,7 +81,7 @@ class SceneFeed:
         self._camera = pycolmap.Camera(synthetic.camera.todict())
 
     def add(self, index: int) -> int:
-        """Add photo ``index``; its image id."""
+        """Add photo ``index``; returns its image id."""
         image_id = len(self.scene) + 1
         pairs = [
             true_pair(self.synthetic, index, other, (image_id, other_id))
@@ -95,7 +95,7 @@ class SceneFeed:
         return image_id
 
     def use_another_camera(self) -> None:
-        """Photos from now on are by a second camera like the first."""
+        """Give further photos a second camera with the same parameters."""
         self._camera = pycolmap.Camera(self.synthetic.camera.todict())
         self._camera.camera_id += 1
 
@@ -106,7 +106,7 @@ class SceneFeed:
 def position_errors_m(
     model: pycolmap.Reconstruction, scene: SyntheticScene, *, prefix: str = ""
 ) -> Float64Array:
-    """(N,) distance of each registered photo from its true place, the model aligned by the
+    """(N,) distance of each registered photo from its true place, after alignment by the
     similarity that fits best."""
     known = {prefix + scene.name(index): index for index in range(len(scene))}
     images = [model.images[image_id] for image_id in model.reg_image_ids()]

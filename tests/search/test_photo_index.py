@@ -144,7 +144,7 @@ def test_with_other_settings_it_is_made_anew_and_says_so(folder):
     update(folder)
     _, done = update(folder, max_features=100)
     assert (done.kept, done.described) == (0, 4)
-    assert str(done).startswith("index built anew: it was made with other settings")
+    assert str(done).startswith("index rebuilt: it was made with other settings")
 
 
 DAMAGES = {

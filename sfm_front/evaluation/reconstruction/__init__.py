@@ -1,1 +1,1 @@
-"""Reconstructions measured: scenes, rivals, accuracy, cost of a photo."""
+"""The reconstruction benchmark: scenes, rivals, accuracy, cost per photo."""

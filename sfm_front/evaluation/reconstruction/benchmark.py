@@ -1,4 +1,4 @@
-"""Run our reconstruction and pycolmap's pipelines over scenes, in turn, and judge each."""
+"""Run our reconstruction and pycolmap's pipelines on scenes, in turn, and assess each."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SIFT_ALONE = "OpenCV SIFT alone"
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A run and, unless it builds no models, what they are worth."""
+    """A run and the quality of its models; None for OpenCV's SIFT alone, which builds none."""
 
     run: Run
     quality: Quality | None
@@ -33,15 +33,15 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """All runs of one method over one scene, at least one."""
+    """All runs of one method on one scene, at least one."""
 
     scene: BenchmarkScene
     method: str
     outcomes: tuple[Outcome, ...]
 
     def means(self) -> dict[str, float | None]:
-        """Means over the runs; None for what no run has. The photo's quantiles are over the
-        photos of all runs."""
+        """Means over the runs; None for what no run has. The quantiles of a photo's seconds are
+        over the photos of all runs."""
         values: dict[str, list[float]] = {}
         for outcome in self.outcomes:
             for name, value in _numbers(outcome).items():
@@ -53,20 +53,20 @@ class Row:
         return means
 
     def stage_means(self) -> dict[str, float]:
-        """Seconds a stage, its mean over the runs that know it."""
+        """Seconds per stage, the mean over the runs that have it."""
         runs = [outcome.run.seconds_by_stage for outcome in self.outcomes]
         stages = dict.fromkeys(stage for run in runs for stage in run)
         return {stage: mean(run[stage] for run in runs if stage in run) for stage in stages}
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Why runs built no model, each reason once."""
+        """Why runs built no model; each reason once."""
         return tuple(
             dict.fromkeys(outcome.run.failure for outcome in self.outcomes if outcome.run.failure)
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, ready for JSON. Of the models' folders, those that were kept."""
+        """Plain values, ready for JSON. Models are listed if their folders were kept."""
         return {
             "scene": self.scene.name,
             "photos": self.scene.num_photos,
@@ -96,9 +96,10 @@ def benchmark_scene(
 ) -> list[Row]:
     """Rows of OpenCV's SIFT alone, of ours, and of each rival.
 
-    Methods take turns in every run, so that a machine that slows down slows all of them. ``ours``
-    starts the ``reconstruct`` command. Each run works in a new folder below ``workspace``, removed
-    after it unless ``keep``. ``note`` takes a line about each run. Run i uses seed + i.
+    Every run goes through all methods, so that a machine that slows down slows all of them.
+    ``ours`` starts the ``reconstruct`` command. Each run has its own folder below ``workspace``,
+    removed afterwards unless ``keep``. ``note`` is called with a line about each run. Run i uses
+    seed + i.
     """
     outcomes: dict[str, list[Outcome]] = {name: [] for name in (SIFT_ALONE, OURS, *rivals)}
     for number in range(runs):

@@ -16,7 +16,7 @@ _OURS_COLOR, _RIVAL_COLOR, _YARDSTICK_COLOR = "#d1495b", "#7d93a8", "#c9ced6"
 
 
 def check_matplotlib() -> None:
-    """Raise ``DependencyError`` where charts cannot be drawn: before an hour of runs, not after."""
+    """Raise ``DependencyError`` if charts cannot be drawn: before an hour of runs, not after."""
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
@@ -24,10 +24,10 @@ def check_matplotlib() -> None:
 
 
 def write_chart(rows: Sequence[Row], out: Path) -> None:
-    """A panel a scene, a bar a method: seconds, and how many photos were registered.
+    """One panel per scene, one bar per method: seconds, and the number of registered photos.
 
-    ``out`` may end in anything that matplotlib writes: png, svg, pdf. Raises ``DependencyError``
-    without matplotlib and ``InputError`` where the file cannot be written.
+    ``out`` has any extension that matplotlib writes: png, svg, pdf. Raises ``DependencyError``
+    without matplotlib and ``InputError`` if the file cannot be written.
     """
     check_matplotlib()
     from matplotlib.figure import Figure
@@ -51,14 +51,14 @@ def write_chart(rows: Sequence[Row], out: Path) -> None:
         panel.set_title(f"{scene}, {shown[0].scene.num_photos} photos", fontsize=10)
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)
-    figure.supxlabel("seconds, whole run; in brackets: photos registered", fontsize=8)
+    figure.supxlabel("seconds, whole run; in brackets: registered photos", fontsize=8)
     save_figure(figure, out)
 
 
 def save_figure(figure: Figure, out: Path) -> None:
-    """Write ``figure`` to the file ``out``, in a new folder if need be.
+    """Write ``figure`` to the file ``out``; folders are created.
 
-    Raises ``InputError`` where the file cannot be written or its ending is unknown.
+    Raises ``InputError`` if the file cannot be written or its extension is unknown.
     """
     try:
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Our own reconstruction as the benchmark runs it: as a user would, in a process of its own."""
+"""Our reconstruction as the benchmark runs it: in its own process, as a user would."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from sfm_front.storage.colmap_models import find_models
 def run_ours(
     command: Sequence[str], photos: Path, workspace: Path, settings: BenchmarkSettings
 ) -> Run:
-    """Reconstruct the folder ``photos`` into ``workspace/output``.
+    """Reconstruct the folder ``photos`` into ``workspace/output``, with ``log.txt`` beside it.
 
-    ``command`` starts the ``reconstruct`` command; its arguments are added. Leaves ``log.txt``
-    beside the output.
+    ``command`` starts the ``reconstruct`` command; its arguments are appended.
     """
     workspace.mkdir(parents=True, exist_ok=True)
     output = workspace / "output"

@@ -1,4 +1,4 @@
-"""How good the models of a run are."""
+"""The quality of a run's models."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quality:
-    """``registered`` counts the photos of the largest model, ``registered_in_all`` those in any.
+    """``registered`` counts the photos in the largest model, ``registered_in_all`` those in any.
 
     ``points`` and ``reprojection_error_px`` are over all models. ``auc`` is that of the pose
     errors at 1, 3 and 5 degrees, in [0, 1]; None without ground truth. ``pairs_joined`` is the
-    share of the pairs known to overlap that one model holds; None where none are known.
+    fraction of the pairs known to overlap with both photos in one model; None if none are known.
     """
 
     registered: int
@@ -34,7 +34,7 @@ class Quality:
 
 
 def assess(folders: Sequence[Path], scene: BenchmarkScene) -> Quality:
-    """Judge the models in ``folders`` against what is known of ``scene``."""
+    """Assess the models in ``folders`` against the ground truth of ``scene``."""
     models = [read_model(folder) for folder in folders]
     names = [_names(model) for model in models]
     points = sum(model.num_points3D() for model in models)
@@ -56,7 +56,7 @@ def _names(model: pycolmap.Reconstruction) -> set[str]:
 def _reprojection_error_px(models: Sequence[pycolmap.Reconstruction]) -> float:
     """Mean over points of the mean over their observations, as COLMAP prints it.
 
-    It is computed anew: a model on disk may have been moved since its errors were written.
+    Recomputed: a model on disk may have been transformed since its errors were written.
     """
     for model in models:
         model.update_point_3d_errors()

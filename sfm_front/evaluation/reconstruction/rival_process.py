@@ -1,4 +1,4 @@
-"""The process of ``rivals``: one pycolmap pipeline, TASK.json RESULT.json."""
+"""The process that ``rivals`` starts: one pycolmap pipeline. Arguments: TASK.json RESULT.json."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _CAMERA_MODES = {
     "per-image": pycolmap.CameraMode.PER_IMAGE,
 }
 
-#: The fewest descriptors a visual word is learnt from (faiss asks for 39), and the most words.
+#: Fewest descriptors per visual word (faiss asks for 39), and the largest number of words.
 _DESCRIPTORS_PER_WORD = 40
 _MAX_WORDS = 4096
 
 
 class _NothingToMatchError(Exception):
-    """This pairing cannot find pairs in these photos."""
+    """This pairing cannot propose pairs of these photos."""
 
 
 class _Pipeline:
@@ -73,7 +73,7 @@ class _Pipeline:
     def spatial(self) -> None:
         with pycolmap.Database.open(self.database_path) as database:
             priors = database.read_all_pose_priors()
-        # A photo whose EXIF tells which way is down has a prior too, without a position.
+        # EXIF with a gravity direction also gives a prior, without a position.
         if sum(bool(np.isfinite(prior.position).all()) for prior in priors) < 2:
             raise _NothingToMatchError("these photos have no GPS position")
         options = pycolmap.SpatialPairingOptions()
@@ -149,7 +149,7 @@ _PAIRINGS: dict[str, Callable[[_Pipeline], None]] = {
 
 
 def main(task: Path, result: Path) -> None:
-    """Run what the file ``task`` says; write stage seconds and failure to the file ``result``."""
+    """Run the pipeline in the file ``task``; write stage seconds and failure to ``result``."""
     pycolmap.logging.minloglevel = pycolmap.logging.ERROR.value
     pipeline = _Pipeline(json.loads(task.read_text()))
     failure = pipeline.run()

@@ -1,4 +1,4 @@
-"""pycolmap's batch pipelines on a folder of photos, each run in a clean process."""
+"""pycolmap's batch pipelines on a folder of photos, each in a fresh process."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from sfm_front.evaluation.process import measure
 from sfm_front.evaluation.reconstruction.types import BenchmarkSettings, Run
 from sfm_front.storage.colmap_models import find_models
 
-#: How each chooses the pairs of photos that it matches.
+#: How each chooses the pairs it matches.
 RIVALS = {
     "exhaustive": "every pair",
-    "sequential": "each photo with the ten after it by name, and with those 2, 4, 8, ... further",
+    "sequential": "each photo with the next ten by name, and with those 2, 4, 8, ... further",
     "spatial": "each photo with its 50 nearest by GPS, at most 100 m away",
-    "vocabtree": "each photo with its 100 nearest by visual words; the words, which a COLMAP user "
-    "downloads, are learnt on these photos before the clock starts",
+    "vocabtree": "each photo with its 100 nearest by visual words; the words, which COLMAP users "
+    "download, are learnt on these photos before the clock starts",
 }
 
-#: Stages that are not part of the method's time.
+#: Stages not counted in a method's time.
 PREPARATION = ("train",)
 
 
 def run_rival(name: str, photos: Path, workspace: Path, settings: BenchmarkSettings) -> Run:
     """Reconstruct the folder ``photos`` with the pipeline ``name`` into the folder ``workspace``.
 
-    Everything but the given settings is as pycolmap has it by default, on the CPU. Leaves
+    Runs on the CPU, with pycolmap's defaults for everything but ``settings``. Leaves
     ``database.db``, ``sparse/`` and ``log.txt`` in ``workspace``, which must be empty or absent.
     """
     if name not in RIVALS:
-        raise ConfigError(f"no rival is called {name}; there are {', '.join(RIVALS)}")
+        raise ConfigError(f"no rival is called {name}; choose from {', '.join(RIVALS)}")
     workspace.mkdir(parents=True, exist_ok=True)
     task, result = workspace / "task.json", workspace / "result.json"
     task.write_text(

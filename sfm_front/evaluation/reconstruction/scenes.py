@@ -1,4 +1,4 @@
-"""A folder to benchmark on -> its photos and what is known about them."""
+"""A folder to benchmark on → its photos and their ground truth."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ NamePair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BenchmarkScene:
-    """``truth`` is the folder of a COLMAP model with the true poses. ``pairs`` are the photos that
-    overlap, by name: where given, poses are judged on these pairs only."""
+    """``truth`` is the folder of a COLMAP model with the true poses. ``pairs`` are the overlapping
+    pairs, by name; if given, poses are assessed on these pairs only."""
 
     name: str
     photos: Path
@@ -28,8 +28,8 @@ def find_scene(folder: Path, truth: Path | None = None) -> BenchmarkScene:
     """The scene in ``folder``: a folder of photos, or one that has them in its ``images``.
 
     Ground truth is ``truth``, else looked for in ``gt`` beside or in the folder of photos: a model,
-    and a list of overlapping pairs in ``*pairs*.txt`` with two names a line. Raises ``InputError``
-    where there are no photos or ``truth`` is no model.
+    and a list of overlapping pairs, ``*pairs*.txt`` with two names per line. Raises ``InputError``
+    if there are no photos or ``truth`` is not a model.
     """
     photos = folder / "images" if (folder / "images").is_dir() else folder
     num_photos = len(list_photos(photos))
@@ -60,6 +60,6 @@ def _read_pairs(file: Path) -> tuple[NamePair, ...]:
         if not names:
             continue
         if len(names) < 2:
-            raise InputError(f"{file}, line {number}: expected two names of photos, got {line!r}")
+            raise InputError(f"{file}, line {number}: expected two photo names, got {line!r}")
         pairs.append((names[0], names[1]))
     return tuple(pairs)

@@ -1,6 +1,7 @@
-"""The yardstick: seconds that OpenCV's SIFT alone takes on a folder of photos.
+"""A lower bound: the seconds that OpenCV's SIFT alone takes on a folder of photos.
 
-Run as a module, it is the process that ``sift_alone_seconds`` measures in: TASK.json RESULT.json.
+Run as a module, it is the process that ``sift_alone_seconds`` starts. Arguments: TASK.json
+RESULT.json.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
 
 
 def sift_alone_seconds(photos: Path, workspace: Path, settings: BenchmarkSettings) -> float:
-    """Detection and description of every photo, one after the other, by OpenCV's own threads.
+    """Detection and description of every photo, one after the other, with OpenCV's threads.
 
-    Reading and resizing are left out. Works in a clean process with files in ``workspace``.
+    Reading and resizing do not count. Runs in a fresh process with files in ``workspace``.
     """
     workspace.mkdir(parents=True, exist_ok=True)
     task, result = workspace / "task.json", workspace / "result.json"
@@ -46,7 +47,7 @@ def sift_alone_seconds(photos: Path, workspace: Path, settings: BenchmarkSetting
 
 
 def main(task: Path, result: Path) -> None:
-    """Do what the file ``task`` says and write the seconds to the file ``result``."""
+    """Run on the photos named in the file ``task``; write the seconds to the file ``result``."""
     import cv2
 
     from sfm_front.photos.reader import PhotoReader

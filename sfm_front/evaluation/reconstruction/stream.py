@@ -1,4 +1,4 @@
-"""What a photo costs by its place in a long stream: a synthetic flight through a session."""
+"""The cost of a photo by its place in a long stream: a session on a synthetic flight."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _DESCRIPTOR = "vlad"
 
 @dataclass(frozen=True, slots=True)
 class PhotoCost:
-    """What one photo cost from retrieval to mapping: wall seconds without global refinement and
-    with it, and the processor's seconds, refinement included, which other work on the machine
-    hardly changes. ``memory_bytes``: the process's after it; None where the system does not tell.
+    """The cost of one photo from retrieval to mapping: wall seconds without and with global
+    refinement, and CPU seconds with refinement, which other work on the machine hardly affects.
+    ``memory_bytes``: the process's memory afterwards; None on systems without /proc.
     """
 
     seconds: float
@@ -38,8 +38,8 @@ class PhotoCost:
 
 @dataclass(frozen=True, slots=True)
 class Growth:
-    """How many times more late photos cost than early ones, by the figures of ``PhotoCost`` and,
-    as ``amortized_seconds``, with each refinement spread over the photos since the one before."""
+    """Cost of late photos over cost of early ones, by the figures of ``PhotoCost`` and, as
+    ``amortized_seconds``, with each refinement spread over the photos since the previous one."""
 
     seconds: float
     seconds_with_refinement: float
@@ -49,8 +49,8 @@ class Growth:
 
 @dataclass(frozen=True, slots=True)
 class StreamResult:
-    """``finish_seconds``: the end of the session, export included. ``auc``: of all pairs' poses,
-    at 1, 3 and 5 degrees, from 0 to 1."""
+    """``finish_seconds``: the end of the session, export included. ``auc``: of the pose errors of
+    all pairs, at 1, 3 and 5 degrees, in [0, 1]."""
 
     photos: tuple[PhotoCost, ...]
     finish_seconds: float
@@ -58,7 +58,7 @@ class StreamResult:
     auc: tuple[float, ...]
 
     def growth(self, early: slice, late: slice) -> Growth:
-        """Means of the late photos over means of the early ones, each figure by itself."""
+        """Mean over the late photos divided by mean over the early ones, for each figure."""
         figures = {
             name: np.array([getattr(photo, name) for photo in self.photos])
             for name in ("seconds", "seconds_with_refinement", "processor_seconds")
@@ -72,10 +72,10 @@ class StreamResult:
         )
 
     def amortized_seconds(self) -> Float64Array:
-        """(N,) wall seconds, each refinement spread over the photos since the one before.
+        """(N,) wall seconds, each refinement spread over the photos since the previous one.
 
-        Refinements come in lumps, further and further apart: which hundred photos one falls into
-        is chance. After the last one its share goes on.
+        Refinements are rare, and rarer as the model grows: which hundred photos one falls into is
+        chance. Photos after the last one get its share too.
         """
         seconds = np.array([photo.seconds for photo in self.photos])
         refinement = np.array([photo.seconds_with_refinement for photo in self.photos]) - seconds
@@ -88,10 +88,10 @@ class StreamResult:
         return amortized
 
     def exponent(self, start: int) -> float:
-        """The power of its number that a photo's cost follows, fitted from ``start`` on.
+        """The exponent of a photo's CPU seconds as a power of its number, from ``start`` on.
 
-        0 is constant, 1 linear. Of the processor's seconds. Refinements come in lumps: what is
-        fitted is the sum up to each photo, whose power is one more.
+        0 is constant, 1 linear. Because refinements come in lumps, the cumulative sum is fitted,
+        whose exponent is one more.
         """
         total = np.cumsum([photo.processor_seconds for photo in self.photos])
         numbers = np.arange(1, len(total) + 1)
@@ -99,7 +99,7 @@ class StreamResult:
         return float(slope) - 1
 
     def memory_per_photo(self, start: int) -> float | None:
-        """Bytes that each photo from ``start`` on added: the slope of a straight line."""
+        """Bytes per photo from ``start`` on: the slope of a fitted line."""
         memory = [photo.memory_bytes for photo in self.photos[start:]]
         known = np.array([value for value in memory if value is not None], np.float64)
         if len(known) < len(memory) or len(known) < 2:
@@ -117,12 +117,12 @@ def run_stream(
     seed: int,
     note: Callable[[PhotoAdded], None],
 ) -> StreamResult:
-    """Fly in strips over hills and reconstruct from given features; nothing is read or detected.
+    """Fly strips over hills and reconstruct from given features; nothing is read or detected.
 
-    ``note`` hears of each photo. Raises ConfigError for fewer than two photos.
+    ``note`` is called with each photo's report. Raises ConfigError for fewer than two photos.
     """
     if num_photos < 2:
-        raise ConfigError(f"a stream has two photos at least, got {num_photos}")
+        raise ConfigError(f"a stream needs at least two photos, got {num_photos}")
     scene = make_scene(num_photos, points_per_image, seed=seed, layout="strip")
     descriptor, _ = resolve(_DESCRIPTOR)
     costs: list[PhotoCost] = []

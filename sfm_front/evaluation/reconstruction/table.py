@@ -11,12 +11,12 @@ _NONE = "-"
 
 
 def format_table(rows: Sequence[Row]) -> str:
-    """One table of all rows and, below it, why runs failed.
+    """One table of all rows, followed by why runs failed.
 
-    Speed-up is that of ours: a method's seconds over ours on the same scene, where both have a
-    model; for OpenCV's SIFT alone it says how near ours is to the limit. A photo's seconds are
-    those of its stages, which overlap between photos. ``registered`` is in the largest model,
-    ``all`` in any; AUC and the share of overlapping pairs in one model are in percent.
+    Speed-up is ours: a method's seconds over ours on the same scene, if both built a model; for
+    OpenCV's SIFT alone it shows how close ours is to that bound. A photo's seconds are those of
+    its stages, which overlap between photos. ``registered`` is in the largest model, ``all`` in
+    any; AUC and pairs joined are in percent.
     """
     ours = {
         row.scene.name: row.means()["seconds"]
@@ -26,7 +26,7 @@ def format_table(rows: Sequence[Row]) -> str:
     cells = [_cells(row, ours.get(row.scene.name)) for row in rows]
     header = [
         name for name in cells[0] if any(line[name] != _NONE for line in cells)
-    ]  # a column that is empty throughout says nothing
+    ]  # empty columns are left out
     lines = [header, *([line[name] for name in header] for line in cells)]
     widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
     text = [aligned(lines[0], widths), "  ".join("-" * width for width in widths)]
@@ -39,9 +39,9 @@ def format_table(rows: Sequence[Row]) -> str:
 
 
 def format_profile(row: Row) -> str:
-    """Where the seconds of ``row`` go: its stages, longest first, with their share of the whole.
+    """Where the seconds of ``row`` go: its stages, longest first, with their share of the total.
 
-    Shares add up to more than 100 % where stages run side by side.
+    Shares add up to more than 100 % because stages overlap.
     """
     whole = row.means()["seconds"] or 0.0
     stages = row.stage_means()
@@ -92,7 +92,7 @@ def _number(value: float | None, form: str) -> str:
 
 
 def _count(value: float | None, whole: int | None = None) -> str:
-    """A mean of counts, without decimals where it is one."""
+    """A mean of counts, without decimals if it is an integer."""
     if value is None:
         return _NONE
     text = f"{value:.0f}" if value == int(value) else f"{value:.1f}"
@@ -100,7 +100,7 @@ def _count(value: float | None, whole: int | None = None) -> str:
 
 
 def aligned(line: Sequence[str], widths: Sequence[int]) -> str:
-    """A line of cells, each as wide as given: two names to the left, numbers to the right."""
+    """A line of cells padded to ``widths``: two names flush left, numbers flush right."""
     return "  ".join(
         text.ljust(width) if column < 2 else text.rjust(width)
         for column, (text, width) in enumerate(zip(line, widths, strict=True))

@@ -1,4 +1,4 @@
-"""What the parts of the reconstruction benchmark hand each other."""
+"""What the parts of the reconstruction benchmark exchange."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ CAMERA_MODES = ("auto", "single", "per-folder", "per-image")
 
 @dataclass(frozen=True, kw_only=True)
 class BenchmarkSettings:
-    """What every method is given alike.
+    """What all methods are given.
 
-    ``max_image_size_px`` is the long side, ``max_features`` the cap a photo. ``order`` and
-    ``seed`` say how photos arrive at a method that takes them one by one.
+    ``max_image_size_px`` limits the long side, ``max_features`` the features per photo. ``order``
+    and ``seed`` set how photos arrive, for a method that takes them one by one.
     """
 
     threads: int
@@ -37,11 +37,11 @@ class BenchmarkSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One method's run over one scene.
+    """One run of a method on a scene.
 
-    ``wall_seconds`` is that of the whole process; ``seconds_by_stage`` and, a photo,
-    ``photo_seconds`` are what it measured itself, and may overlap in time. ``models`` are folders,
-    largest first. ``failure`` says why there is no model.
+    ``wall_seconds`` is the whole process; ``seconds_by_stage`` and ``photo_seconds`` (one per
+    photo) are what it measured itself, and may overlap in time. ``models`` are folders, largest
+    first. ``failure`` says why there is no model.
     """
 
     wall_seconds: float

@@ -1,15 +1,15 @@
-"""How good a ranking of photos is: average precision and its kin, by the official definitions.
+"""The accuracy of rankings: average precision and related measures, by the official definitions.
 
 Average precision is the area under the curve of precision over recall, cut into trapezoids, where
 precision before the first answer is 1. Written differently, it is the same number in
 
 - Oxford5k's and Paris6k's ``compute_ap.cpp`` (Philbin, Arandjelovic and Zisserman): positives are
-  the good and the ok photos, junk is passed over as if it were not in the ranking, and the query
-  itself counts where it is listed, which it always is in Oxford5k;
-- INRIA Holidays' ``holidays_map.py`` (Jegou and Douze): the query itself is passed over;
-- revisited Oxford and Paris' ``evaluate.py`` (Radenovic et al., CVPR 2018): junk is passed over,
-  and queries without a positive are left out of the mean. Positives are the easy photos ("easy"),
-  the easy and hard ones ("medium") or the hard ones ("hard"); the other kind is junk.
+  the good and the ok photos, junk is skipped as if it were not in the ranking, and the query itself
+  counts if it is listed, which it always is in Oxford5k;
+- INRIA Holidays' ``holidays_map.py`` (Jegou and Douze): the query itself is skipped;
+- revisited Oxford and Paris' ``evaluate.py`` (Radenovic et al., CVPR 2018): junk is skipped, and
+  queries without a positive are left out of the mean. Positives are the easy photos ("easy"), the
+  easy and hard ones ("medium") or the hard ones ("hard"); the other kind is junk.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ RECALL_AT = (5, 10, 25)
 class Accuracy:
     """Means over the queries that have a relevant photo, in [0, 1]; ``num_queries`` of them.
 
-    ``first_right``: the share of queries whose first answer is relevant, the precision at 1.
-    ``recall``: by k, the share of a query's relevant photos that are among the first k answers.
-    Where more than k are relevant it cannot reach 1.
+    ``first_right``: the fraction of queries whose first answer is relevant, the precision at 1.
+    ``recall``: by k, the fraction of a query's relevant photos among the first k answers. It cannot
+    reach 1 if more than k are relevant.
     """
 
     num_queries: int
@@ -42,10 +42,10 @@ class Accuracy:
 def average_precision(
     ranking: Iterable[str], relevant: AbstractSet[str], ignored: AbstractSet[str] = frozenset()
 ) -> float:
-    """Area under precision over recall, in [0, 1]. ``relevant`` has one photo at least.
+    """Area under precision over recall, in [0, 1]. ``relevant`` must not be empty.
 
-    ``ranking``: names, best first. Those in ``ignored`` count as absent, even if they are relevant;
-    relevant ones that are not in the ranking count as never found.
+    ``ranking``: names, best first. Those in ``ignored`` count as absent, even if relevant; relevant
+    ones missing from the ranking count as never found.
     """
     area, found, before = 0.0, 0, 1.0
     for position, name in enumerate(_counted(ranking, ignored), start=1):
@@ -59,7 +59,7 @@ def average_precision(
 
 
 def assess(rankings: Sequence[Sequence[str]], queries: Sequence[Query]) -> Accuracy | None:
-    """Judge one ranking of names a query; None where no query has anything to find."""
+    """Assess one ranking of names per query; None if no query has a relevant photo."""
     answered = [
         (_counted(ranking, query.ignored), query.relevant)
         for ranking, query in zip(rankings, queries, strict=True)
@@ -76,7 +76,7 @@ def assess(rankings: Sequence[Sequence[str]], queries: Sequence[Query]) -> Accur
 
 
 def recall_at(k: int, ranking: Sequence[str], relevant: AbstractSet[str]) -> float:
-    """Share of the ``relevant`` photos that are among the first ``k`` of the ranking."""
+    """Fraction of the ``relevant`` photos among the first ``k`` of the ranking."""
     return sum(name in relevant for name in ranking[:k]) / len(relevant)
 
 

@@ -1,4 +1,4 @@
-"""Search photos by photo with each method in turn, and judge and time the answers."""
+"""Search photos by photo with a method; assess and time its answers."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sfm_front.evaluation.retrieval.types import BenchPhoto, Method, Staged
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a method is worth on a dataset.
+    """The result of a method on a dataset.
 
-    ``indexed``: photos searched, distractors among them. ``seconds`` a query, extraction apart: the
-    median, for a ranking of all of them, as mean average precision asks for it of every method.
-    ``stage_seconds``: medians of the stages of an answer, where the method tells them.
+    ``indexed``: number of photos searched, including distractors. ``seconds`` per query without
+    extraction: the median, for a ranking of all photos, which mean average precision needs.
+    ``stage_seconds``: medians of the stages of a query, if the method is ``Staged``.
     """
 
     dataset: str
@@ -43,9 +43,10 @@ class _Answer:
 
 
 def benchmark(method: Method, material: Material, note: Callable[[str], None]) -> list[Outcome]:
-    """Index the photos once, ask each query once, and judge the answers by every dataset.
+    """Index the photos once, ask each query once, and assess the answers for every dataset.
 
-    A query that could not be described has an empty answer. ``note`` takes a line about each.
+    A query that could not be described has an empty answer. ``note`` is called with a line per
+    dataset.
     """
     started = perf_counter()
     method.build(material.photos)
@@ -78,7 +79,7 @@ def _ask(method: Method, photo: BenchPhoto, material: Material) -> _Answer:
     ranked = method.rank(photo)
     seconds = perf_counter() - started
     stage_seconds = method.seconds if isinstance(method, Staged) else {}
-    # A distractor has no name: it is nobody's answer.
+    # Distractors have no name: they are never relevant.
     names = [material.names.get(one.image_id, "") for one in ranked]
     return _Answer(names, seconds, stage_seconds)
 

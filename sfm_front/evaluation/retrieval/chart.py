@@ -1,4 +1,4 @@
-"""The retrieval benchmark as a bar chart: mean average precision beside seconds a query."""
+"""The retrieval benchmark as a bar chart: mean average precision and time per query."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _OURS_COLOR, _RIVAL_COLOR = "#d1495b", "#7d93a8"
 
 
 def write_chart(outcomes: Sequence[Outcome], out: Path, highlighted: Sequence[str] = ()) -> None:
-    """Two panels a dataset, a bar a method, most precise first; ``highlighted`` methods are red.
+    """Two panels per dataset, one bar per method, best mAP first; ``highlighted`` methods are red.
 
-    Seconds are on a logarithmic axis. Raises ``DependencyError`` without matplotlib and
-    ``InputError`` where the file cannot be written.
+    Milliseconds are on a logarithmic axis. Raises ``DependencyError`` without matplotlib and
+    ``InputError`` if the file cannot be written.
     """
     check_matplotlib()
     from matplotlib.figure import Figure
@@ -41,7 +41,7 @@ def write_chart(outcomes: Sequence[Outcome], out: Path, highlighted: Sequence[st
         fast.set_xscale("log")
         fast.set_xlim(min(milliseconds) / 2, 5 * max(milliseconds))
         fast.set_yticks([])
-        fast.set_title("milliseconds a query", fontsize=10)
+        fast.set_title("milliseconds per query", fontsize=10)
         for panel in (precise, fast):
             panel.tick_params(labelsize=8)
             panel.spines[["top", "right"]].set_visible(False)

@@ -1,4 +1,4 @@
-"""Photos of a dataset → BenchPhotos, read from disk where they were described before."""
+"""Photos of a dataset → BenchPhotos, from the cache if they were described before."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from sfm_front.photos.reader import PhotoReader
 from sfm_front.types import PhotoPath, Skipped, View
 
 Progress = Callable[[int, int], None]
-"""Called with the photos done and all of them."""
+"""Called with the number of photos done and the total."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Described:
-    """``photos`` by name, in the order given; ``skipped`` are those that cannot be used."""
+    """``photos`` by name, in the order given; ``skipped`` are unusable files."""
 
     photos: Mapping[str, BenchPhoto]
     skipped: tuple[Skipped, ...]
 
 
 class BenchExtraction:
-    """Gives photos all that any method asks for, and image ids that count up from 1."""
+    """Computes what any method needs of a photo; image ids count up from 1."""
 
     def __init__(
         self,
@@ -42,10 +42,10 @@ class BenchExtraction:
         max_features: int = 4000,
         num_threads: int = 1,
     ) -> None:
-        """``cache``: a folder, made if need be, that any datasets and settings may share.
+        """``cache``: a folder, created if missing, which datasets and settings may share.
 
-        ``descriptors``: those whose vectors are wanted, by the names under which
-        ``BenchPhoto.vectors`` has them; ``features.global_descriptor.resolve`` makes them.
+        ``descriptors``: those to compute, by their name in ``BenchPhoto.vectors``;
+        ``features.global_descriptors.descriptor.resolve`` makes them.
         """
         if PerceptualHash.name in descriptors:
             raise ConfigError(f"every photo has a {PerceptualHash.name}: do not ask for it")
@@ -61,7 +61,7 @@ class BenchExtraction:
         self._ids = count(1)
 
     def photos(self, photos: Mapping[str, Path], progress: Progress | None = None) -> Described:
-        """Describe photos by name. Raises InputError where the cache cannot be written to."""
+        """Describe photos by name. Raises InputError if the cache cannot be written to."""
         return self._describe(photos, {}, progress)
 
     def queries(
@@ -70,7 +70,7 @@ class BenchExtraction:
         photos: Mapping[str, Path],
         progress: Progress | None = None,
     ) -> Described:
-        """Describe queries, by their own names, each within its box if it has one."""
+        """Describe queries, by their own names, each cropped to its box if it has one."""
         queries = list(queries)
         return self._describe(
             {query.name: photos[query.photo] for query in queries},

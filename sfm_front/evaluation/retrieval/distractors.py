@@ -1,14 +1,13 @@
-"""Photos that nobody took, to fill an index with: made of parts of real ones.
+"""Synthetic photos to fill an index with, made of parts of real ones.
 
-What a query costs depends on how many photos are indexed, and hardly on what they show, as long as
-their vectors and descriptors are spread as real ones are. So a published dataset's size can be
-timed without its photos. A distractor is like a real photo in
+The cost of a query depends on the number of photos in the index and hardly on what they show, if
+their vectors and descriptors are distributed like real ones. So retrieval can be timed at a
+published dataset's size without its photos. A distractor resembles a real photo in
 
 - its global vectors: see ``distractor_vectors``;
-- its features: the four rows of cells of a SIFT descriptor, each from another real one, at real
-  keypoints in no order. Over 100 pairs of photos of three scenes, 800 features each, 5 (median)
-  matched between a photo and a distractor, 6 between photos of different scenes, and RANSAC kept
-  none of either.
+- its features: the four rows of cells of a SIFT descriptor, each from a different real one, at
+  shuffled real keypoints. They match real photos about as often as unrelated photos do, and RANSAC
+  rejects these matches (TUNING: distractor-features).
 """
 
 from __future__ import annotations
@@ -23,25 +22,25 @@ from sfm_front.evaluation.retrieval.distractor_vectors import VectorMaker
 from sfm_front.evaluation.retrieval.types import BenchPhoto
 from sfm_front.types import Features, Float32Array, View
 
-# Numbers in a row of the four times four cells of a SIFT descriptor, of eight directions each.
+# A row of a SIFT descriptor's 4 x 4 cells of 8 directions.
 _ROW_OF_CELLS = 32
-# Features that all distractors share, each through a window of its own: 53 MB.
+# Features that all distractors share, each through its own window: 53 MB of descriptors.
 _POOL = 400_000
-# Of distractors' image ids: far above those of real photos.
+# Image ids of distractors start here, far above those of real photos.
 _FIRST_ID = 1_000_000_000
 
 
 class WithDistractors(Sequence[BenchPhoto]):
-    """Real photos, then distractors up to ``size``, each made when it is asked for.
+    """Real photos, then distractors up to ``size``, made on access.
 
-    Making them on demand keeps 100 000 of them small: their features are windows on one pool, and
-    of their vectors nothing stays but what an index keeps. The same index gives the same photo.
+    So 100 000 of them need little memory: their features are windows on one pool, and their vectors
+    are not kept. The same position always gives the same photo.
     """
 
     def __init__(
         self, photos: Sequence[BenchPhoto], size: int, num_features: int, *, seed: int = 0
     ) -> None:
-        """``num_features``: of each distractor. ``photos``: two at least."""
+        """``num_features`` per distractor; at least two ``photos``."""
         self._photos = photos
         self._size = max(size, len(photos))
         self._seed = seed
@@ -85,7 +84,7 @@ class WithDistractors(Sequence[BenchPhoto]):
 
 
 def _pooled(parts: Sequence[Features], camera: pycolmap.Camera, seed: int) -> Features:
-    """As many features as all photos have, or ``_POOL``; none of them is a photo's."""
+    """Mixed features, as many as all photos have, at most ``_POOL``."""
     rng = np.random.default_rng(seed)
     descriptors = np.concatenate([part.descriptors for part in parts])
     keypoints = np.concatenate([part.keypoints for part in parts])
@@ -101,7 +100,7 @@ def _pooled(parts: Sequence[Features], camera: pycolmap.Camera, seed: int) -> Fe
 
 
 class _LazyVectors(Mapping[str, Float32Array]):
-    """A distractor's vectors, each made anew whenever it is asked for."""
+    """A distractor's vectors, computed on each access."""
 
     def __init__(self, makers: Mapping[str, VectorMaker], seed: Sequence[int]) -> None:
         self._makers = makers

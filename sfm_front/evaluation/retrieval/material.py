@@ -1,4 +1,4 @@
-"""Datasets → everything a method is given: photos to index and queries, described."""
+"""Datasets → the input of all methods: described photos to index, and described queries."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sfm_front.evaluation.retrieval.describe import BenchExtraction, Described
 from sfm_front.evaluation.retrieval.types import BenchPhoto, Dataset, Query
 
 QueryKey = tuple[str, tuple[float, float, float, float] | None]
-"""A query's photo and box: what a method is shown of it."""
+"""A query's photo and box: all that a method sees of it."""
 
 _TOLD_EVERY = 100
 _SEED = 0
@@ -21,8 +21,8 @@ _SEED = 0
 class Material:
     """Datasets over the same photos, and these photos described.
 
-    ``photos``: those to index. ``names`` by image id; a distractor has none. ``queries``: by photo
-    and box; one that cannot be described is not among them.
+    ``photos``: those to index. ``names`` by image id; distractors have none. ``queries`` by photo
+    and box, without those that cannot be described.
     """
 
     datasets: Sequence[Dataset]
@@ -32,12 +32,13 @@ class Material:
 
 
 def key_of(query: Query) -> QueryKey:
-    """Queries of one key look alike to a method."""
+    """Queries of the same key are the same to a method."""
     return query.photo, query.box
 
 
 def sampled(queries: tuple[Query, ...], count: int | None) -> tuple[Query, ...]:
-    """``count`` of the queries at random, always the same and in their order, or all of them."""
+    """``count`` random queries, always the same ones and in their order; all if ``count`` is None
+    or there are fewer."""
     if count is None or count >= len(queries):
         return queries
     chosen = sorted(Random(_SEED).sample(range(len(queries)), count))
@@ -49,8 +50,8 @@ def describe(
 ) -> Material:
     """Describe the photos and queries of ``datasets``, which all search the same photos.
 
-    A query that is a whole photo of those searched is described once. ``note`` hears of progress
-    and of every photo that cannot be used. Raises ``InputError`` where none can.
+    A query that is a whole indexed photo is not described again. ``note`` is called with progress
+    and with every photo that cannot be used. Raises ``InputError`` if none can.
     """
     first = datasets[0]
 

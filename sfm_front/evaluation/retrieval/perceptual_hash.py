@@ -15,9 +15,9 @@ _LOW_FREQUENCIES = 8
 class PerceptualHash:
     """pHash as a global vector: (64,) float32, each bit ±1/8, so that it has length 1.
 
-    The grey photo is reduced to 32 x 32; of its cosine transform the 8 x 8 lowest frequencies are
-    kept, and each bit says whether one of them is above their median. OpenCV's wheel has no image
-    hashing module, so this is the transform it uses.
+    The grey photo is reduced to 32 x 32; the 8 x 8 lowest frequencies of its cosine transform are
+    kept, and each bit says whether one of them is above their median. The same as OpenCV's pHash,
+    whose module is not in its wheel.
 
     Source: Zauner, "Implementation and Benchmarking of Perceptual Image Hash Functions", 2010.
     """
@@ -32,7 +32,7 @@ class PerceptualHash:
         small = cv2.resize(gray, (_SIDE, _SIDE), interpolation=cv2.INTER_AREA)
         spectrum = cv2.dct(small.astype(np.float32))
         low = spectrum[:_LOW_FREQUENCIES, :_LOW_FREQUENCIES].ravel()
-        # The mean brightness, which comes first, would only shift the median.
+        # Without the first, the mean brightness, which would shift the median.
         bits = low > np.median(low[1:])
         unit: Float32Array = np.where(bits, 1, -1).astype(np.float32) / np.float32(BITS**0.5)
         return unit

@@ -1,4 +1,4 @@
-"""Reference models of a pool's scenes: found in a folder, or built there by pycolmap."""
+"""Reference models of a pool's scenes: found in a folder, or built there with pycolmap."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
 from sfm_front.evaluation.retrieval.datasets.pool import Scene
 from sfm_front.storage.colmap_models import find_models
 
-#: The pipeline whose models are the reference: the one that misses no pair.
+#: The pipeline whose models are the reference, because it matches every pair.
 PIPELINE = "exhaustive"
 
 
@@ -25,10 +25,10 @@ def with_models(
 ) -> tuple[Scene, ...]:
     """Scenes with a reference model each, where one can be made.
 
-    A scene without any has it below ``folder/SCENE/exhaustive``, where ``benchmark_reconstruction
-    --keep`` leaves it too; if nothing is there, it is built, which takes minutes to hours. Photos
-    of which pycolmap makes no model are left to be distractors; ``note`` is told. Raises
-    ``InputError`` where a scene has no model and ``folder`` is None.
+    A scene without one is looked up in ``folder/SCENE/exhaustive``, where
+    ``benchmark_reconstruction --keep`` leaves it too; if nothing is there, the model is built,
+    which takes minutes to hours. If that fails, its photos only serve as distractors, and ``note``
+    is told. Raises ``InputError`` if a scene has no model and ``folder`` is None.
     """
     lacking = [scene.name for scene in scenes if not scene.models]
     if lacking and folder is None:
@@ -46,7 +46,7 @@ def _found_or_built(
     scene: Scene, folder: Path, settings: BenchmarkSettings, note: Callable[[str], None]
 ) -> Scene:
     home = folder / scene.name / PIPELINE
-    # Built aside, so that what an interrupted run leaves is not taken for a result.
+    # Built beside it, so that an interrupted run's remains are not taken for a result.
     unfinished = folder / scene.name / f"{PIPELINE}.unfinished"
     if not home.is_dir():
         note(f"{scene.name}: building its reference model by pycolmap's {PIPELINE} pipeline")

@@ -25,22 +25,21 @@ from sfm_front.retrieval.retriever import RetrievalOptions
 from sfm_front.runtime.worker_pool import WorkerPool
 
 OURS = Hierarchical.name
-"""Our method; ``ours:VECTOR`` is the same with another global vector."""
+"""Our method; ``ours:VECTOR`` is ours with another global vector."""
 
 Note = Callable[[str], None]
 
 
 @dataclass(frozen=True, kw_only=True)
 class RetrievalSettings:
-    """What is asked of whom, and what every method is given alike.
+    """Datasets, methods, and the settings all methods share.
 
     ``datasets`` as ``specs`` reads them; ``models`` and ``min_shared`` are for pools among them.
     ``methods``: names in ``METHODS``, ``ours:VECTOR`` for ours with another global vector, or
-    global vectors joined by ``+``. ``weights``: files by the network's name; those of other
-    networks are looked for in the cache of weights. ``cache``: the folder of descriptions.
-    ``scale``: indices are filled with distractors up to this many photos. ``num_queries``: how many
-    a dataset are asked, all if None.
-    ``retrieval`` and ``rerank`` are for our method.
+    global vectors joined by ``+``. ``weights``: files by network name; other networks' are looked
+    up in torch's cache. ``cache``: the folder of described photos. ``scale``: indices are filled
+    with distractors up to this many photos. ``num_queries`` per dataset, all if None. ``retrieval``
+    and ``rerank`` are for our method.
     """
 
     datasets: Sequence[str]
@@ -59,7 +58,7 @@ class RetrievalSettings:
 
     def __post_init__(self) -> None:
         if not self.methods or len(set(self.methods)) < len(self.methods):
-            raise ConfigError(f"name one method at least, each once; got {','.join(self.methods)}")
+            raise ConfigError(f"name at least one method, each once; got {','.join(self.methods)}")
         for name in ("threads", "min_shared", "scale", "num_queries"):
             value = getattr(self, name)
             if value is not None and value < 1:
@@ -69,9 +68,9 @@ class RetrievalSettings:
 def run(
     settings: RetrievalSettings, note: Note, figures: FigureWriter | None = None
 ) -> list[Outcome]:
-    """Every method on every dataset; ``note`` takes a line about each step.
+    """Every method on every dataset; ``note`` is called with a line about each step.
 
-    What is wrong with settings or folders shows before the first photo is described.
+    Errors in settings or folders are raised before the first photo is described.
     """
     outcomes: list[Outcome] = []
     with WorkerPool(settings.threads) as workers:
@@ -112,7 +111,7 @@ def run(
 
 
 def descriptors(names: Iterable[str], weights: Mapping[str, Path]) -> dict[str, GlobalDescriptor]:
-    """Global descriptors by name, networks with their file in ``weights`` if it has one."""
+    """Global descriptors by name, each network with its file in ``weights``, if any."""
     resolved = {}
     for name in names:
         own = next((weights[part] for part in name.split("+") if part in weights), None)

@@ -1,4 +1,4 @@
-"""What a user names on the command line → datasets: ``KIND:FOLDER``."""
+"""``KIND:FOLDER`` on the command line → datasets."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def load(
 ) -> tuple[Dataset, ...]:
     """The datasets that ``spec`` names; all of them search the same photos.
 
-    ``models``: the folder of a pool's reference models, and where those missing are built.
-    ``min_shared``: points that make two photos of a pool relevant to each other. ``note`` takes
-    lines about what goes on.
+    ``models``: the folder of a pool's reference models, in which missing ones are built.
+    ``min_shared``: points that make two photos of a pool relevant to each other. ``note`` is called
+    with lines about progress.
 
     Raises:
         ConfigError: no such kind.
-        InputError: the folder is not that dataset, or not all of it.
+        InputError: the folder is not that dataset, or an incomplete one.
     """
     kind, colon, folder = spec.partition(":")
     if kind not in KINDS or not colon or not folder:

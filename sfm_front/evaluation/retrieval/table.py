@@ -1,4 +1,4 @@
-"""The retrieval benchmark as a table: a row a dataset and measure, a column a method."""
+"""The retrieval benchmark as a table: a row per dataset and measure, a column per method."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from sfm_front.evaluation.retrieval.benchmark import Outcome
 
 _NONE = "-"
 _SECONDS = "s/query"
-# The two steps of hierarchical retrieval, of which the paper tells the seconds apart.
+# The two steps of hierarchical retrieval, which the paper times separately.
 _STEPS = ("coarse", "fine")
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One measure on one dataset, its value by method; None where a method has none."""
+    """One measure on one dataset, a value per method; None if a method has none."""
 
     dataset: str
     measure: str
@@ -28,14 +28,14 @@ class Line:
 
     @property
     def cells(self) -> list[str]:
-        """Text: seconds to the tenth of a millisecond, shares to the thousandth."""
+        """Text: seconds with four decimals, all else with three."""
         form = ".4f" if _is_seconds(self.measure) else ".3f"
         shown = (_NONE if value is None else format(value, form) for value in self.values)
         return [self.dataset, self.measure, *shown]
 
 
 def format_table(outcomes: Sequence[Outcome]) -> str:
-    """The table as text, datasets set apart."""
+    """The table as text, with a blank line between datasets."""
     methods, lines = tabulate(outcomes)
     cells = [["dataset", "measure", *methods], *(line.cells for line in lines)]
     widths = [max(len(line[column]) for line in cells) for column in range(len(cells[0]))]
@@ -50,7 +50,7 @@ def format_table(outcomes: Sequence[Outcome]) -> str:
 
 
 def write_csv(outcomes: Sequence[Outcome], out: Path) -> None:
-    """The same table with every digit. Raises ``InputError`` where it cannot be written."""
+    """The same table with all digits. Raises ``InputError`` if it cannot be written."""
     methods, lines = tabulate(outcomes)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -76,7 +76,7 @@ def tabulate(outcomes: Sequence[Outcome]) -> tuple[list[str], list[Line]]:
 
 
 def measures(outcome: Outcome) -> dict[str, float]:
-    """What the table says of a method on a dataset: seconds, and shares in [0, 1]."""
+    """A method's figures on a dataset: seconds, and accuracies in [0, 1]."""
     values = {_SECONDS: outcome.seconds}
     for step in _STEPS:
         if step in outcome.stage_seconds:

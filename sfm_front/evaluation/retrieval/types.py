@@ -1,4 +1,4 @@
-"""What retrieval datasets, methods and the benchmark hand each other."""
+"""What retrieval datasets, methods and the benchmark exchange."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Query:
     """A photo to search with, and what should be found.
 
     ``photo``, ``relevant`` and ``ignored`` are names in the dataset. ``box``: left, top, right,
-    bottom in pixels of the file, where only that part of the photo is the query. ``ignored``
-    photos ("junk") count neither for nor against a ranking; the query itself is among them where
-    the dataset's protocol leaves it out.
+    bottom in pixels of the file, if only that part of the photo is the query. ``ignored`` photos
+    ("junk") count neither for nor against a ranking; the query itself is among them if the
+    dataset's protocol excludes it.
     """
 
     name: str
@@ -29,9 +29,9 @@ class Query:
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """Photos to search among, by name, and queries with their answers.
+    """Photos to search, by name, and queries with their answers.
 
-    ``query_photos`` are searched with and not among those searched; their names are not in
+    ``query_photos`` are queries that are not searched themselves; their names are not in
     ``photos``.
     """
 
@@ -43,7 +43,7 @@ class Dataset:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BenchPhoto:
-    """A photo with everything that any method may ask of it.
+    """A photo with everything that any method needs.
 
     ``view`` has image id, camera and SIFT features. ``vectors``: (d,) float32 of length 1, by the
     name of the global descriptor. ``perceptual_hash``: (8,) uint8, 64 bits.
@@ -56,9 +56,9 @@ class BenchPhoto:
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
-    """A photo in an answer: higher ``score`` is better; what it means is the method's affair.
+    """A photo in an answer: higher ``score`` is better; its meaning depends on the method.
 
-    ``cosine`` and ``inliers`` where the method has them.
+    ``cosine`` and ``inliers`` if the method computes them.
     """
 
     image_id: int
@@ -79,19 +79,19 @@ class Method(Protocol):
         ...
 
     def build(self, photos: Sequence[BenchPhoto]) -> None:
-        """Index these photos, all of them at once."""
+        """Index these photos."""
         ...
 
     def rank(self, query: BenchPhoto) -> list[Ranked]:
-        """Every indexed photo, best first; the query's own too, if it is indexed."""
+        """All indexed photos, best first; the query's own too, if it is indexed."""
         ...
 
 
 @runtime_checkable
 class Staged(Protocol):
-    """A method that tells what it spent its time on."""
+    """A method that times its stages."""
 
     @property
     def seconds(self) -> Mapping[str, float]:
-        """Of the last query, by stage; work that only completes the ranking is in none."""
+        """Of the last query, by stage; work that only completes the ranking does not count."""
         ...

@@ -1,1 +1,1 @@
-"""Scenes with known truth."""
+"""Synthetic scenes with ground truth."""

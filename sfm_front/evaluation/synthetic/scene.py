@@ -1,4 +1,4 @@
-"""Scenes with known truth and ready-made features: a stream of photos that needs no pixels."""
+"""Synthetic scenes with ground truth and features: a stream of photos without pixels."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from sfm_front.types import Exif, ExtractedPhoto, Features, Float32Array, Float6
 
 Layout = Literal["orbit", "strip"]
 
-# A photo keeps the order of strength that its points have everywhere, give or take this much.
+# A point's strength is the same in all photos, up to this standard deviation.
 _STRENGTH_JITTER = 0.1
-_DESCRIPTOR_NOISE = 16  # uniform, in the units of a uint8 descriptor: about 95 % cosine
-# SIFT histograms have few large entries; a gamma distribution of this shape has as few.
+_DESCRIPTOR_NOISE = 16  # uniform, in units of a uint8 descriptor: a cosine of about 0.95
+# SIFT histograms have few large entries, as has a gamma distribution of this shape.
 _HISTOGRAM_SHAPE = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SyntheticPhoto:
-    """What one photo sees. ``point_ids`` (N,) int64 names the scene point that each keypoint
-    shows, -1 where it shows none or stands in a wrong place."""
+    """What one photo sees. ``point_ids`` (N,) int64 is the scene point that each keypoint shows,
+    -1 if it shows none or is misplaced."""
 
     name: str
     features: Features
@@ -35,8 +35,8 @@ class SyntheticPhoto:
 
 @dataclass(frozen=True, eq=False)
 class SyntheticScene:
-    """A flight over known points. Photos are made when asked for, at a cost that depends on what
-    a photo sees and not on the scene's size; memory is some 200 bytes a scene point.
+    """A flight over known points. Photos are made on demand, at a cost that depends on what a
+    photo sees and not on the size of the scene; memory is about 200 bytes per scene point.
 
     ``camera`` took every photo, ``cams_from_world`` are the true poses, ``points`` (P, 3) float64
     the true points in metres, z up.
@@ -61,7 +61,7 @@ class SyntheticScene:
         return len(self.cams_from_world)
 
     def name(self, index: int) -> str:
-        """The name of photo ``index``, counted from 0; names sort in the order of the flight."""
+        """The name of photo ``index``, counted from 0; names sort in flight order."""
         return f"{index:06d}.jpg"
 
     def photo(self, index: int) -> SyntheticPhoto:
@@ -131,16 +131,15 @@ def make_scene(
     background_ratio: float = 0.3,
     repeatability: float = 0.8,
 ) -> SyntheticScene:
-    """Plan a flight and scatter the points that it will see.
+    """Plan a flight and scatter the points that it sees.
 
-    ``points_per_image``: about so many scene points lie in a photo's view. "orbit" circles a
-    lumpy ball, every photo sees the side that faces it; "strip" flies parallel lines over hills,
-    as a survey does, and every photo overlaps a bounded number of others however many there are.
-    A point in view is detected with probability ``repeatability``, ``noise_px`` (standard
-    deviation, each axis) from its place. ``outlier_ratio`` of the detections stand anywhere in the
-    photo and keep their descriptor: they make wrong matches. ``background_ratio`` of all keypoints
-    show no scene point: they make none.
-    Raises ConfigError where a value is out of range.
+    ``points_per_image``: approximate number of scene points in a photo's view. "orbit" circles a
+    lumpy ball, and every photo sees the side that faces it; "strip" flies parallel lines over
+    hills, as a survey does, and the number of overlapping photos is bounded. A point in view is
+    detected with probability ``repeatability``, with noise of standard deviation ``noise_px`` along
+    each axis. ``outlier_ratio`` of the detections are moved anywhere in the photo but keep their
+    descriptor: they cause wrong matches. ``background_ratio`` of all keypoints show no scene point:
+    they cause no matches. Raises ConfigError if a value is out of range.
     """
     _check(num_images, points_per_image, noise_px, outlier_ratio, background_ratio, repeatability)
     rng = np.random.default_rng([seed, 0])
@@ -174,7 +173,7 @@ def make_scene(
 def as_described(
     photo: SyntheticPhoto, camera: pycolmap.Camera, global_vector: Float32Array
 ) -> ExtractedPhoto:
-    """The photo as if ``camera`` had taken it and it had been read from a file and described.
+    """The photo as if taken by ``camera``, read from a file and extracted.
 
     ``global_vector`` (D,) float32.
     """

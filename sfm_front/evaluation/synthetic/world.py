@@ -1,4 +1,4 @@
-"""The points of a synthetic scene, the flight over them, and which points a pose sees where."""
+"""The points of a synthetic scene, flights over them, and their projections."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ _FORWARD_OVERLAP, _SIDE_OVERLAP = 0.75, 0.65
 _HILLS_M = 6.0  # amplitude of each of the waves that make the hills
 _HILL_LENGTHS_M = (37.0, 61.0, 95.0, 170.0)
 _ORBIT_RADIUS_M, _BALL_RADIUS_M = 40.0, 12.0
-# A surface is seen where it is turned to the camera by more than this cosine.
+# A surface is visible if the cosine between its normal and the viewing ray exceeds this.
 _FACING = 0.35
 
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Points (P, 3) with what makes them keypoints, sorted by the square tile they lie in.
+    """Points (P, 3) with what makes them keypoints, sorted by square tile.
 
-    ``normals`` (P, 3): the side that points can be seen from. ``strokes`` (P, 3): a short line in
-    the world at each point; what it looks like in a photo is the keypoint's scale and orientation.
+    ``normals`` (P, 3): the side from which points are visible. ``strokes`` (P, 3): a short line in
+    the world at each point; its projection gives the keypoint's scale and orientation.
     ``strengths`` (P,) in [0, 1). Tile (row, column) holds the points from
-    ``tile_starts[row, column]`` up to the next start, and ``tile_starts`` has one column more than
-    there are tiles. ``reach_m``: farther than this from the point below it, a photo sees nothing.
+    ``tile_starts[row, column]`` up to the next start; ``tile_starts`` has one more column than
+    there are tiles. ``reach_m``: a photo sees nothing farther than this from the point below it.
     """
 
     points: Float64Array
@@ -51,7 +51,7 @@ class World:
         facing = np.einsum("nd,nd->n", self.normals[ids], towards)
         ids = ids[facing > _FACING * distances]
         in_camera = self.points[ids] @ rotation.T + cam_from_world.translation
-        # Well outside the picture the distortion may bend points back into it.
+        # Distortion may map points far outside the picture back into it.
         ahead = in_camera[:, 2] > np.hypot(in_camera[:, 0], in_camera[:, 1])
         ids, in_camera = ids[ahead], in_camera[ahead]
         pixels = np.asarray(camera.img_from_cam(in_camera))
@@ -61,7 +61,7 @@ class World:
         return ids, pixels, np.asarray(camera.img_from_cam(ends)) - pixels
 
     def _near(self, place: Float64Array) -> NDArray[np.int64]:
-        """Ids of the points in tiles within reach of a place (2,): a run of ids a tile row."""
+        """Ids of the points in tiles within reach of a place (2,): one run of ids per tile row."""
         rows, columns = self.tile_starts.shape[0], self.tile_starts.shape[1] - 1
         low = np.floor((place - self.reach_m - self.tile_origin) / self.tile_size_m).astype(int)
         high = np.floor((place + self.reach_m - self.tile_origin) / self.tile_size_m).astype(int)
@@ -77,7 +77,7 @@ def fly_orbit(
     num_images: int, points_per_image: int, rng: np.random.Generator
 ) -> tuple[World, tuple[pycolmap.Rigid3d, ...]]:
     """A circle around a lumpy ball."""
-    # A camera this far off sees the cap of the ball where the surface is turned to it enough.
+    # The cap of the ball that is visible from this distance.
     cap = np.arccos(_FACING) - np.arcsin(_BALL_RADIUS_M / _ORBIT_RADIUS_M * np.sqrt(1 - _FACING**2))
     count = round(points_per_image * 2.0 / (1.0 - np.cos(cap)))
     normals = rng.normal(size=(count, 3))
@@ -100,10 +100,10 @@ def fly_orbit(
 def fly_strip(
     num_images: int, points_per_image: int, camera: pycolmap.Camera, rng: np.random.Generator
 ) -> tuple[World, tuple[pycolmap.Rigid3d, ...]]:
-    """Parallel lines, there and back, over hills."""
+    """Parallel lines over hills, flown to and fro."""
     width = _ALTITUDE_M * camera.width / camera.focal_length
     depth = _ALTITUDE_M * camera.height / camera.focal_length
-    # The picture's width lies across the line of flight, as usual in a survey.
+    # The picture's width is across the flight direction, as usual in a survey.
     step, spacing = depth * (1 - _FORWARD_OVERLAP), width * (1 - _SIDE_OVERLAP)
     photos_a_line = max(1, round(np.sqrt(num_images * spacing / step)))
     line, place = np.divmod(np.arange(num_images), photos_a_line)
@@ -158,7 +158,7 @@ def _tiled(
     grid = np.arange(rows)[:, None] * columns + np.arange(columns + 1)[None, :]
     sideways = np.cross(normals, rng.normal(size=normals.shape))
     sideways /= np.linalg.norm(sideways, axis=1, keepdims=True)
-    # As wide as SIFT keypoints are at these distances: mostly 2 to 6 pixels.
+    # So that keypoints have the scale of SIFT's at these distances: mostly 2 to 6 pixels.
     lengths = np.exp(rng.normal(0.0, 0.5, (len(points), 1))) * reach_m / 350.0
     return World(
         points=points[order],

@@ -1,1 +1,1 @@
-"""Global vectors: networks, VLAD, and both side by side."""
+"""Global vectors: networks, VLAD, and joins of them."""

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
     from sfm_front.features.global_descriptors.networks import DescriptorNetwork
 
-# ImageNet statistics, RGB in [0, 1], which all three networks were trained with.
+# ImageNet statistics, RGB in [0, 1]; all three networks were trained with them.
 MEAN_RGB = np.array([0.485, 0.456, 0.406], np.float32)
 STD_RGB = np.array([0.229, 0.224, 0.225], np.float32)
 
-# Below this AlexNet's first layers leave nothing to pool.
+# Below this, AlexNet's first layers leave nothing to pool.
 SHORTEST_SIDE_PX = 64
 
 
@@ -34,7 +34,7 @@ class Network:
     """A named network: its class, its weights and its input size.
 
     ``class_name`` is looked up in ``networks`` on first use only, because that loads torch.
-    ``longer_side_px``: size that photos are reduced to.
+    ``longer_side_px``: photos are reduced to this.
     """
 
     class_name: str
@@ -65,11 +65,11 @@ class CnnDescriptor:
     """Describes photos by one network. Thread-safe."""
 
     def __init__(self, name: str, *, weights: Path, device: str = "cpu") -> None:
-        """``name`` is one of ``NETWORKS``, ``weights`` its file, ``device`` as torch names it.
+        """``name`` is one of ``NETWORKS``, ``weights`` its file, ``device`` a torch device name.
 
         Raises:
             WeightsError: the file is broken or another network's.
-            ConfigError: torch has no such device here.
+            ConfigError: torch cannot use this device.
             DependencyError: torch cannot be loaded.
         """
         self.name = name
@@ -99,7 +99,7 @@ def preprocess(pixels: Uint8Array, longer_side_px: int) -> Float32Array:
     height, width = pixels.shape[:2]
     scale = min(1.0, longer_side_px / max(height, width))
     size = tuple(max(SHORTEST_SIDE_PX, round(side * scale)) for side in (width, height))
-    # A photo of that size stays unchanged.
+    # A photo already of this size stays unchanged.
     reduced = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
     normalised = (reduced.astype(np.float32) / 255.0 - MEAN_RGB) / STD_RGB
     return np.ascontiguousarray(normalised.transpose(2, 0, 1)[np.newaxis])

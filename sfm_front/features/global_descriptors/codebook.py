@@ -22,8 +22,8 @@ Float16Array = NDArray[np.float16]
 class Codebook:
     """Visual words and their whitening, float16 to keep the shipped file small.
 
-    ``mean`` (128,) is subtracted from a descriptor, ``projection`` (128, d) reduces what remains
-    and whitens it by half, ``words`` (k, d) are the centres of the clusters there. ``whitening``
+    ``mean`` (128,) is subtracted from a descriptor, ``projection`` (128, d) reduces the difference
+    and half whitens it, ``words`` (k, d) are the cluster centres in that space. ``whitening``
     (k, d, d) holds one lower triangular matrix per word, which decorrelates the residuals at that
     word and gives them equal variance.
     """
@@ -47,8 +47,8 @@ class Codebook:
             if shapes == fitting:
                 return
         raise ConfigError(
-            f"a codebook of shapes {', '.join(map(str, shapes))} is none: "
-            "(128,), (128, d), (k, d), (k, d, d) fit each other"
+            f"inconsistent codebook shapes {', '.join(map(str, shapes))}: "
+            "expected (128,), (128, d), (k, d), (k, d, d)"
         )
 
     @property

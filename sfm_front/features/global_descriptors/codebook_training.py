@@ -65,10 +65,10 @@ def _draw(descriptors: Sequence[Uint8Array], per_photo: int, seed: int) -> Uint8
 
 
 def _principal_axes(descriptors: Uint8Array, dimension: int) -> tuple[Float32Array, Float32Array]:
-    """Mean (128,) of the descriptors, and the projection (128, dimension) on their strongest
+    """Mean (128,) of the descriptors, and the projection (128, dimension) onto their strongest
     principal components, each divided by the square root of its standard deviation.
 
-    This is half a whitening: without it the strong components alone decide which word is nearest;
+    This is half a whitening: without it, the strong components alone decide which word is nearest;
     a full one amplifies the noise of the weak ones.
     """
     points = descriptors.astype(np.float32)
@@ -96,18 +96,18 @@ def _cluster(points: Float32Array, num_words: int, seed: int) -> Float32Array:
 
 
 def _whitening(words: VisualWords, photos: Sequence[Features]) -> Float64Array:
-    """(k, d, d): for each word the inverse of the Cholesky factor of the second moments that the
-    photos' directions have there.
+    """(k, d, d): for each word, the inverse Cholesky factor of the second moments of the photos'
+    directions there.
 
-    Second moments, not covariances: what all photos share at a word is its strongest direction and
-    distinguishes them least.
+    Second moments, not covariances: what all photos have in common at a word is its strongest
+    direction and distinguishes them least.
     """
     moments = np.zeros((words.count, words.dimension, words.dimension))
     for photo in photos:
         directions = words.directions(photo)
         moments += directions[:, :, np.newaxis] * directions[:, np.newaxis]
     moments /= len(photos)
-    # The directions are of length 1: their variances have the mean 1 / dimension.
+    # The directions have length 1: their mean variance is 1 / dimension.
     damping = DAMPING / words.dimension * np.eye(words.dimension)
     factors = np.linalg.cholesky(moments + damping)
     inverses: Float64Array = np.tril(np.linalg.inv(factors))

@@ -1,7 +1,7 @@
 """Global vectors by name: one descriptor, or several joined into one vector.
 
-A joined vector holds its parts side by side, each of length 1 times the square root of its weight,
-so that the cosine of two photos is the weighted mean of the cosines of their parts.
+A joined vector concatenates its parts, each of length 1 times the square root of its weight, so
+that the cosine of two photos is the weighted mean of their parts' cosines.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Source_contra = TypeVar("Source_contra", contravariant=True)
 
 
 class GlobalDescriptorPart(Protocol[Source_contra]):
-    """One way to describe a photo: by its pixels (h, w, 3) uint8 RGB, or by its features."""
+    """Describes a photo by its pixels, (h, w, 3) uint8 RGB, or by its features."""
 
     @property
     def name(self) -> str: ...
@@ -54,7 +54,7 @@ class GlobalDescriptorPart(Protocol[Source_contra]):
 
 
 class GlobalDescriptor:
-    """What a photo is retrieved by: (dimension,) float32 of length 1, compared by cosine.
+    """Describes a photo for retrieval: (dimension,) float32 of length 1, compared by cosine.
 
     The parts from pixels and from features can be computed separately, so that networks run in
     parallel to SIFT; ``join`` combines them. Thread-safe.
@@ -92,11 +92,11 @@ class GlobalDescriptor:
 
     def join(self, of_pixels: Float32Array, of_features: Float32Array) -> Float32Array:
         """Both parts → (dimension,) float32 of length 1."""
-        # Not yet of length 1 if a photo has no features and so no VLAD.
+        # Not yet of length 1 if a photo has no features, hence no VLAD.
         return unit_length(np.concatenate([of_pixels, of_features]))
 
     def describe(self, pixels: Uint8Array, features: Features) -> Float32Array:
-        """The whole vector at once."""
+        """Both parts, joined: (dimension,) float32 of length 1."""
         return self.join(self.describe_pixels(pixels), self.describe_local(features))
 
 
@@ -107,7 +107,7 @@ def resolve(
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> tuple[GlobalDescriptor, str | None]:
-    """The descriptor called ``name``, and what to tell the user about the choice, if anything.
+    """The descriptor called ``name``, and a message for the user about the choice, if any.
 
     ``name`` is one of ``NAMES``, several joined by ``+``, or ``auto``: ResNet101 joined with VLAD
     if its weights are cached or can be downloaded, else VLAD. ``weights`` replaces the network's
@@ -151,9 +151,9 @@ def _split(name: str) -> list[str]:
     valid = f"{', '.join(NAMES)}, any of them joined by '+', or {AUTO}"
     for part in parts:
         if part not in NAMES:
-            raise ConfigError(f"no global descriptor is called {part!r}: take {valid}")
+            raise ConfigError(f"no global descriptor is called {part!r}: choose {valid}")
     if len(set(parts)) < len(parts):
-        raise ConfigError(f"global descriptor {name!r} names a part twice: take {valid}")
+        raise ConfigError(f"global descriptor {name!r} names a part twice: choose {valid}")
     return parts
 
 

@@ -1,8 +1,8 @@
 """The three networks behind the global vectors, as torch modules.
 
-Parameter names and order of layers are torchvision's, so that its weights files load as they are.
-``forward`` maps a batch (B, 3, H, W) float32, normalised with the mean and deviation of ImageNet,
-to descriptors (B, D) float32 of any norm. H and W are free. The classifier of each network (its
+Parameter names and layer order are torchvision's, so that its weights files load as they are.
+``forward`` maps a batch (B, 3, H, W) float32, normalised by ImageNet's mean and standard deviation,
+to descriptors (B, D) float32 of any norm. H and W are free. Each network's classifier (its
 ``HEAD``) is part of the module, so that a complete file loads, but is never run.
 
 Sources: Krizhevsky, "One weird trick for parallelizing convolutional neural networks", 2014
@@ -32,7 +32,7 @@ class DescriptorNetwork(nn.Module):
 class AlexNet(DescriptorNetwork):
     """AlexNet up to FC7, the second fully connected layer, after its ReLU (4096 numbers).
 
-    After the ReLU, because that is what Caffe's ``fc7`` holds and "FC7" has come to mean.
+    After the ReLU, because Caffe applies it in place and "FC7" has come to mean the result.
     """
 
     DIMENSION = 4096
@@ -83,7 +83,7 @@ class Bottleneck(nn.Module):
         channels_out = channels * self.EXPANSION
         self.conv1 = nn.Conv2d(channels_in, channels, kernel_size=1, bias=False)
         self.bn1 = nn.BatchNorm2d(channels)
-        # The stride is here and not in conv1: the weights were trained that way.
+        # Stride here, not in conv1: the weights were trained that way.
         self.conv2 = nn.Conv2d(channels, channels, 3, stride=stride, padding=1, bias=False)
         self.bn2 = nn.BatchNorm2d(channels)
         self.conv3 = nn.Conv2d(channels, channels_out, kernel_size=1, bias=False)
@@ -134,14 +134,14 @@ class ResNet101(DescriptorNetwork):
 
 
 def _bottlenecks(channels_in: int, channels: int, *, count: int, stride: int) -> nn.Sequential:
-    """``count`` blocks, of which the first changes size and width."""
+    """``count`` blocks; the first changes resolution and width."""
     first = Bottleneck(channels_in, channels, stride)
     rest = (Bottleneck(channels * Bottleneck.EXPANSION, channels, 1) for _ in range(count - 1))
     return nn.Sequential(first, *rest)
 
 
 class InvertedResidual(nn.Module):
-    """MobileNetV2's block: 1x1 widens, 3x3 works channel by channel, 1x1 narrows without a ReLU."""
+    """MobileNetV2's block: 1x1 widens, 3x3 works per channel, 1x1 narrows without a ReLU."""
 
     def __init__(self, channels_in: int, channels_out: int, stride: int, expansion: int) -> None:
         super().__init__()

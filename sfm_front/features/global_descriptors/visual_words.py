@@ -27,7 +27,7 @@ class VisualWords:
         self.count, self.dimension = self._words.shape
 
     def project(self, descriptors: Uint8Array) -> Float32Array:
-        """(N, 128) uint8 RootSIFT → (N, d) float32, the space of the words."""
+        """(N, 128) uint8 RootSIFT → (N, d) float32 in the space of the words."""
         points: Float32Array = descriptors.astype(np.float32) @ self._projection
         points -= self._projected_mean
         return points
@@ -41,7 +41,7 @@ class VisualWords:
         nearness -= self._half_squares
         nearest = nearness.argmax(axis=1)
         residuals = unit_length(points - self._words[nearest])
-        # Large keypoints are few, and show the scene rather than its texture.
+        # Large keypoints are rare, and show structure rather than texture.
         residuals *= np.sqrt(features.keypoints[:, 2:3])
         sums = np.zeros_like(self._words)
         # Sorting by word makes each word's rows one run: far faster than np.add.at.

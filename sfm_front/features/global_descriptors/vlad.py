@@ -3,7 +3,7 @@
 Descriptors are projected, partly whitened and assigned to their nearest visual word. Each residual
 is normalised, weighted by the square root of its keypoint's scale, and summed per word. Each word's
 sum is normalised again, so that neither a repeated texture nor a crowded word outweighs the rest,
-and finally whitened: what all photos have in common at a word says nothing about one of them
+and finally whitened: what all photos have in common at a word does not distinguish them
 (TUNING: vlad-words, vlad-whitening).
 
 Sources: Jegou et al., "Aggregating local image descriptors into compact codes", PAMI 2012;

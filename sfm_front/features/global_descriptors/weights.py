@@ -1,4 +1,4 @@
-"""Load a weights file, checked against the network it is meant for."""
+"""Load a weights file and check it against its network."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sfm_front.errors import WeightsError
 from sfm_front.features.global_descriptors.networks import DescriptorNetwork
 
 NAMED_LAYERS = 3
-"""Number of layers that an error message names; further ones are only counted."""
+"""Number of layers named in an error message; the rest are only counted."""
 
 
 def load_weights(
@@ -23,13 +23,12 @@ def load_weights(
 
     The file is a state_dict in torchvision's naming, bare or as ``{"state_dict": …}``, with or
     without DataParallel's ``module.`` prefix, and with or without the classifier, which is not
-    used. Pickled code is never run. ``network`` may have been built on torch's meta device;
-    what the file lacks of the classifier is left there. ``expected`` names the official file, for
-    the message.
+    used. Pickled code is never run. ``network`` may have been built on torch's meta device; the
+    classifier stays there. ``expected`` is the official file's name, for the error message.
 
     Raises:
         WeightsError: the file cannot be read, or is not of this network: layers are missing, have
-            another shape, or are unknown (a deeper network of the same family has them).
+            another shape, or are unknown (as in a deeper network of the same family).
     """
     state = read_state_dict(file, expected=expected)
     problem = _mismatch(state, network)
@@ -44,16 +43,16 @@ def load_weights(
 
 
 def read_state_dict(file: Path, *, expected: str) -> dict[str, Tensor]:
-    """The tensors in ``file`` by name, on the CPU, unwrapped from what training scripts add.
+    """The tensors in ``file`` by name, on the CPU, without the wrappers of training scripts.
 
     Raises:
-        WeightsError: no such file, damaged, or anything but tensors by name.
+        WeightsError: the file is missing, damaged, or holds anything but tensors by name.
     """
     if not file.is_file():
         raise WeightsError(f"{file}: no such file. Expected torchvision's {expected}.")
     try:
         content: Any = torch.load(file, map_location="cpu", weights_only=True)
-    except Exception as error:  # torch raises another kind for each way a file can be damaged
+    except Exception as error:  # torch raises a different exception for each kind of damage
         raise WeightsError(
             f"{file.name}: cannot be read as weights: cut off, or not a plain state_dict. "
             f"Download torchvision's {expected} again."
@@ -72,12 +71,12 @@ def _is_state_dict(content: object) -> bool:
 
 
 def _mismatch(state: Mapping[str, Tensor], network: DescriptorNetwork) -> str:
-    """Why ``state`` cannot be weights of ``network``; empty if it can."""
+    """Why ``state`` cannot be the weights of ``network``; empty if it can."""
     known = network.state_dict()
     needed = {
         name: tensor.shape
         for name, tensor in known.items()
-        # Batches are counted for training only, and older files lack the count.
+        # The count of batches is for training only, and older files lack it.
         if not name.startswith(network.HEAD) and not name.endswith(".num_batches_tracked")
     }
     missing = [name for name in needed if name not in state]

@@ -35,14 +35,14 @@ def checkpoint_folder() -> Path:
 
 
 def cached_or_fetched(url: str, *, progress: Progress | None = None) -> Path:
-    """The file at ``url``, from the cache if complete there, else downloaded into it.
+    """The file at ``url``: from the cache if complete there, else downloaded into it.
 
     The file name ends in the first digits of the file's SHA-256, as in ``resnet101-63fe2227.pth``,
-    and a file that does not match them is never used. Nothing partial is ever seen under that name.
+    and a file that does not match them is never used. No partial file ever has that name.
 
     Raises:
-        WeightsError: it is not cached and cannot be downloaded. An unreachable network costs
-            ``CONNECT_TIMEOUT_S`` at most.
+        WeightsError: it is not cached and cannot be downloaded. An unreachable server costs at
+            most ``CONNECT_TIMEOUT_S``.
     """
     path = checkpoint_folder() / file_name(url)
     if path.is_file() and _is_whole(path, url):
@@ -53,8 +53,8 @@ def cached_or_fetched(url: str, *, progress: Progress | None = None) -> Path:
     except (OSError, http.client.HTTPException) as error:
         reason = getattr(error, "reason", None) or error
         raise WeightsError(
-            f"{path.name} is not in {path.parent} and cannot be fetched ({reason}). "
-            f"Put {url} there, or name a file with --weights."
+            f"{path.name} is not in {path.parent} and cannot be downloaded ({reason}). "
+            f"Put {url} there, or give a file with --weights."
         ) from error
     return path
 
@@ -97,8 +97,8 @@ def _download(url: str, path: Path, progress: Progress | None) -> None:
                 if progress is not None:
                     progress(received, expected)
         if not _is_whole(partial, url):
-            raise OSError(f"{received} bytes came whose SHA-256 is not {hash_prefix(url)}…")
-        # mkstemp makes files that only their owner can read; a cache may be shared.
+            raise OSError(f"the SHA-256 of {received} bytes is not {hash_prefix(url)}…")
+        # mkstemp's files are readable by their owner only; a cache may be shared.
         partial.chmod(0o644)
         partial.replace(path)
     finally:
@@ -108,8 +108,8 @@ def _download(url: str, path: Path, progress: Progress | None) -> None:
 def _open(url: str) -> tuple[IO[bytes], int]:
     """The response and its length, or an error within ``CONNECT_TIMEOUT_S``.
 
-    In its own thread, because a socket's timeout covers neither the name look-up nor the
-    second address that is tried after the first.
+    In its own thread, because a socket's timeout covers neither the name look-up nor further
+    addresses tried after the first.
     """
     outcome: queue.SimpleQueue[tuple[IO[bytes], int] | Exception] = queue.SimpleQueue()
 
@@ -117,7 +117,7 @@ def _open(url: str) -> tuple[IO[bytes], int]:
         try:
             response = urllib.request.urlopen(url, timeout=STALL_TIMEOUT_S)
             outcome.put((response, int(response.headers.get("Content-Length") or 0)))
-        except Exception as error:  # raised by the caller, who waits for it
+        except Exception as error:  # raised in the waiting thread
             outcome.put(error)
 
     threading.Thread(target=work, name="weights-connect", daemon=True).start()

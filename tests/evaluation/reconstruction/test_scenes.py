@@ -43,7 +43,7 @@ def test_pairs_are_read_without_a_model(photos):
     assert scene.truth is None
     assert scene.pairs == (("1.jpg", "0.jpg"), ("2.jpg", "3.jpg"))
     listed.write_text("1.jpg 0.jpg\n2.jpg\n")
-    with pytest.raises(InputError, match="line 2: expected two names"):
+    with pytest.raises(InputError, match="line 2: expected two photo names"):
         find_scene(photos)
 
 

@@ -74,7 +74,7 @@ def test_a_short_flight_goes_through_a_session(tmp_path):
 
 def test_one_photo_is_no_stream(tmp_path):
     options = SessionOptions(global_descriptor="vlad")
-    with pytest.raises(ConfigError, match="two photos at least, got 1"):
+    with pytest.raises(ConfigError, match="at least two photos, got 1"):
         run_stream(1, 100, tmp_path, options, seed=0, note=print)
 
 

@@ -81,7 +81,7 @@ def test_paris_is_in_folders_and_has_broken_photos(tmp_path):
 
 def test_oxford_that_lacks_a_part(tmp_path):
     photos(tmp_path / "images", "tower_01.jpg")
-    with pytest.raises(InputError, match="ground truth of oxford5k is not there"):
+    with pytest.raises(InputError, match="ground truth of oxford5k is missing"):
         oxford.load_oxford5k(tmp_path)
     oxford_lists(tmp_path, good="tower_01 tower_02")
     with pytest.raises(InputError, match="1 of 5063 photos of oxford5k"):
@@ -129,7 +129,7 @@ def test_revisited_in_three_difficulties(tmp_path):
 
 def test_revisited_that_lacks_a_part(tmp_path):
     photos(tmp_path / "jpg", *(f"{name}.jpg" for name in "abcdq"))
-    with pytest.raises(InputError, match=r"gnd_rparis6k.pkl is not there; get it from http"):
+    with pytest.raises(InputError, match=r"gnd_rparis6k.pkl is missing; get it from http"):
         revisited.load_rparis6k(tmp_path)
     file = tmp_path / "gnd_rparis6k.pkl"
     file.write_bytes(pickle.dumps(ANNOTATION))

@@ -90,5 +90,5 @@ def test_the_script_refuses_before_it_runs(tmp_path, arguments, message):
 
 
 def test_settings_name_what_is_wrong(tmp_path):
-    with pytest.raises(ConfigError, match="name one method at least"):
+    with pytest.raises(ConfigError, match="name at least one method"):
         RetrievalSettings(datasets=["pool:x"], methods=[], threads=1, cache=tmp_path)

@@ -39,7 +39,7 @@ def test_every_array_counts_in_the_fingerprint(name):
 @pytest.mark.parametrize("name", [field.name for field in fields(Codebook)])
 def test_arrays_that_do_not_fit_each_other_are_refused(name):
     codebook = random_codebook()
-    with pytest.raises(ConfigError, match="fit each other"):
+    with pytest.raises(ConfigError, match="inconsistent codebook shapes"):
         replace(codebook, **{name: getattr(codebook, name)[:-1]})
 
 

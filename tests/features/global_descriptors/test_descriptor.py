@@ -129,7 +129,7 @@ def test_a_weights_file_that_is_wrong_is_an_error_under_auto_too(tmp_path):
 @pytest.fixture
 def no_weights(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(url: str, **_: object) -> Path:
-        raise WeightsError(f"{weights_cache.file_name(url)} cannot be fetched")
+        raise WeightsError(f"{weights_cache.file_name(url)} cannot be downloaded")
 
     monkeypatch.setattr(weights_cache, "cached_or_fetched", fail)
 
@@ -139,7 +139,7 @@ def test_auto_without_weights_is_vlad_and_says_why():
     descriptor, message = resolve("auto")
     assert descriptor.name == "vlad"
     assert message is not None
-    assert "resnet101-63fe2227.pth cannot be fetched" in message
+    assert "resnet101-63fe2227.pth cannot be downloaded" in message
     assert "\n" not in message
 
 

@@ -26,8 +26,8 @@ LIST_FILE = "holidays_images.dat"
 def load(folder: Path) -> tuple[Dataset, ...]:
     """The dataset unpacked in ``folder``: ``jpg/100000.jpg`` and so on.
 
-    Where the evaluation package's ``holidays_images.dat`` lies beside the photos, it says which
-    there must be. Raises ``InputError`` where photos lack.
+    If the evaluation package's ``holidays_images.dat`` lies beside the photos, it lists those
+    required. Raises ``InputError`` if photos are missing.
     """
     photos = photos_by_stem(folder)
     listed = next(iter(sorted(folder.rglob(LIST_FILE))), None)
@@ -42,15 +42,16 @@ def load(folder: Path) -> tuple[Dataset, ...]:
 
 
 def queries_of(names: Iterable[str]) -> tuple[Query, ...]:
-    """``100000.jpg`` asks for the other photos whose number divided by 100 is 1000.
+    """Photos are queries if their number is divisible by 100, and ignored in their own ranking.
 
-    A photo whose number is divisible by 100 is a query; it is ignored in its own ranking.
+    The query ``100000.jpg`` should find the other photos whose number, integer divided by 100, is
+    1000.
     """
     groups: dict[int, list[str]] = defaultdict(list)
     for name in names:
         stem = Path(name).stem
         if not stem.isdecimal():
-            raise InputError(f"{name}: photos of Holidays are called by number, as 100000.jpg is")
+            raise InputError(f"{name}: photos of Holidays are named by number, such as 100000.jpg")
         groups[int(stem) // 100].append(name)
     queries = []
     for group in groups.values():

@@ -20,7 +20,7 @@ from sfm_front.evaluation.retrieval.types import Dataset, Query
 OXFORD_SOURCE = "https://www.robots.ox.ac.uk/~vgg/data/oxbuildings/ (oxbuild_images.tgz)"
 PARIS_SOURCE = "https://www.robots.ox.ac.uk/~vgg/data/parisbuildings/ (paris_1 and paris_2)"
 
-#: Photos of Paris6k that were published broken (its corrupt.txt); everybody leaves them out.
+#: Photos of Paris6k that were published broken (its corrupt.txt); all evaluations omit them.
 CORRUPT_PARIS = frozenset(
     f"paris_{place}_{number:06d}"
     for place, numbers in {
@@ -36,7 +36,7 @@ CORRUPT_PARIS = frozenset(
     for number in numbers
 )
 
-# Query files of Oxford5k write this before the photo's name; it is not part of it.
+# Query files of Oxford5k put this before the photo's name; it is not part of it.
 _QUERY_PREFIX = "oxc1_"
 _QUERY_FILE = "_query.txt"
 
@@ -44,8 +44,8 @@ _QUERY_FILE = "_query.txt"
 def load(folder: Path, name: str, num_photos: int, source: str) -> tuple[Dataset, ...]:
     """The dataset in ``folder``: photos at any depth, and the text files of the ground truth.
 
-    ``num_photos``: how many there must be, broken ones apart. Raises ``InputError`` where photos
-    or ground truth lack.
+    ``num_photos``: the number required, without broken ones. Raises ``InputError`` if photos or
+    ground truth are missing.
     """
     photos = {
         stem: path
@@ -55,7 +55,7 @@ def load(folder: Path, name: str, num_photos: int, source: str) -> tuple[Dataset
     lists = next(iter(sorted(folder.rglob(f"*{_QUERY_FILE}"))), None)
     if lists is None:
         raise InputError(
-            f"{folder}: the ground truth of {name} is not there (all_*{_QUERY_FILE} and so on); "
+            f"{folder}: the ground truth of {name} is missing (all_*{_QUERY_FILE} and so on); "
             f"unpack it into this folder, from {source.split(' ')[0]}"
         )
     queries = read_queries(lists.parent)

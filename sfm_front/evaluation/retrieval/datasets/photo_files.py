@@ -1,4 +1,4 @@
-"""Find a published dataset's photos on disk and tell what lacks."""
+"""Find a published dataset's photos on disk and report missing ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NAMED = 3
 def photos_by_stem(folder: Path) -> dict[str, Path]:
     """Every photo at or below ``folder``, by its file name without extension.
 
-    Archives unpack flat or into a sub-folder a place, and annotations name no folders.
+    Archives unpack flat or into one sub-folder per place, and annotations name no folders.
     """
     return {photo.path.stem: photo.path for photo in list_photos(folder)}
 
@@ -34,7 +34,7 @@ def require(
 
 
 def require_count(found: int, needed: int, folder: Path, dataset: str, source: str) -> None:
-    """Raise ``InputError`` where fewer photos were found than the dataset has."""
+    """Raise ``InputError`` if fewer photos were found than the dataset has."""
     if found < needed:
         raise InputError(
             f"{folder}: {found} of {needed} photos of {dataset} are there; get them from {source}"

@@ -1,7 +1,7 @@
-"""Read a pickle that holds plain data, and run nothing that it asks for.
+"""Read a pickle of plain data without running any code from it.
 
-A pickle may name any function and have it called while it is read. This reader knows what arrays
-of numpy need and nothing else.
+A pickle may have any function called while it is read. This reader allows only what numpy arrays
+need.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def _no_bytes() -> bytes:
 _ALLOWED: dict[tuple[str, str], Any] = {
     ("numpy", "ndarray"): np.ndarray,
     ("numpy", "dtype"): np.dtype,
-    # numpy 2 moved its core: files of either age are read by either.
+    # numpy 2 moved its core: files of both ages must be readable with both.
     ("numpy.core.multiarray", "_reconstruct"): _RECONSTRUCT,
     ("numpy._core.multiarray", "_reconstruct"): _RECONSTRUCT,
     ("numpy.core.multiarray", "scalar"): _SCALAR,
@@ -52,16 +52,16 @@ class _PlainUnpickler(pickle.Unpickler):
 
 
 def read_plain_pickle(file: Path) -> Any:
-    """What ``file`` holds: dictionaries, lists, text, numbers and arrays.
+    """The content of ``file``: dictionaries, lists, text, numbers and arrays.
 
-    Raises ``InputError`` where it is damaged or holds anything else.
+    Raises ``InputError`` if it is damaged or holds anything else.
     """
     try:
-        # Strings of a pickle written by Python 2 are bytes in any encoding, arrays among them.
+        # In a pickle written by Python 2, strings, also those of arrays, are bytes in any encoding.
         return _PlainUnpickler(io.BytesIO(file.read_bytes()), encoding="latin1").load()
-    except Exception as error:  # a damaged pickle fails in any way there is
+    except Exception as error:  # a damaged pickle raises anything
         reason = str(error) or type(error).__name__
         raise InputError(
-            f"{file}: not read, because it is damaged or holds more than plain data ({reason}); "
+            f"{file}: cannot be read: it is damaged or holds more than plain data ({reason}); "
             "download it again"
         ) from error

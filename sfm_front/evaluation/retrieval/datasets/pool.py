@@ -1,4 +1,4 @@
-"""A scene pool: folders of photos of which COLMAP models say which show the same points."""
+"""A scene pool: folders of photos, with COLMAP models that say which photos share points."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from sfm_front.storage.colmap_models import find_models, read_model
 if TYPE_CHECKING:
     import pycolmap
 
-#: Fewest points in common that make two photos relevant to each other.
+#: Two photos that share at least this many points are relevant to each other.
 MIN_SHARED_POINTS = 20
 
-# Points taken at a time, so that a large model needs little memory.
+# Points per step, so that a large model needs little memory.
 _BLOCK = 20_000
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A folder of photos, those below ``photos``, and the folders of its reference models."""
+    """A scene: all photos below the folder ``photos``, and the folders of its reference models."""
 
     name: str
     photos: Path
@@ -37,10 +37,10 @@ class Scene:
 def find_scenes(folder: Path) -> tuple[Scene, ...]:
     """The scenes of a pool: sub-folders that have an ``images`` folder, or ``folder`` itself.
 
-    Models are those in a scene's ``sparse``. Raises ``InputError`` where there is no scene.
+    Models are those in a scene's ``sparse``. Raises ``InputError`` if there is no scene.
     """
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; give one of scenes, each with its images/")
+        raise InputError(f"{folder}: no such folder; give a folder of scenes, each with images/")
     homes = [folder] if (folder / "images").is_dir() else sorted(folder.iterdir())
     scenes = tuple(
         Scene(home.resolve().name, home / "images", tuple(find_models(home / "sparse")))
@@ -48,16 +48,16 @@ def find_scenes(folder: Path) -> tuple[Scene, ...]:
         if (home / "images").is_dir()
     )
     if not scenes:
-        raise InputError(f"{folder}: no scene in it; a scene is a folder that has images/")
+        raise InputError(f"{folder}: no scene in it; a scene is a folder with images/ in it")
     return scenes
 
 
 def load(scenes: Sequence[Scene], name: str, min_shared: int = MIN_SHARED_POINTS) -> Dataset:
     """One dataset of all photos of all scenes, named ``scene/photo``.
 
-    Every photo is a query that has a relevant one: one with which it shares ``min_shared`` points
-    in a reference model, whichever. Photos of two scenes are taken for unrelated. A query's own
-    photo is ignored.
+    Two photos are relevant to each other if they share ``min_shared`` points in any reference
+    model; photos of different scenes never are. Every photo with a relevant one is a query, and
+    ignored in its own ranking.
     """
     photos: dict[str, Path] = {}
     queries: list[Query] = []
@@ -93,7 +93,7 @@ def related_photos(
 
 
 def shared_points(model: pycolmap.Reconstruction) -> tuple[list[str], NDArray[np.int64]]:
-    """Names of the n registered photos, and how many points each two of them see, (n, n)."""
+    """Names of the n registered photos, and the number of points each pair shares, (n, n)."""
     images = [model.images[image_id] for image_id in model.reg_image_ids()]
     row_of = {point_id: row for row, point_id in enumerate(model.point3D_ids())}
     seen_by = [

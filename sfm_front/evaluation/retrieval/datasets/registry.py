@@ -18,4 +18,4 @@ PUBLISHED: Mapping[str, Callable[[Path], tuple[Dataset, ...]]] = MappingProxyTyp
         "rparis6k": revisited.load_rparis6k,
     }
 )
-"""What reads each of them from a folder: one dataset, or several over the same photos."""
+"""The reader of each from a folder: one dataset, or several over the same photos."""

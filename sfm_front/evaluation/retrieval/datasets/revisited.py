@@ -31,12 +31,12 @@ def load(folder: Path, name: str, source: str) -> tuple[Dataset, ...]:
     """Datasets ``NAME easy``, ``NAME medium`` and ``NAME hard`` over the same photos.
 
     ``folder`` holds ``gnd_NAME.pkl`` and the photos, at any depth. The photos of queries are not
-    among those searched. Raises ``InputError`` where a part lacks.
+    among those searched. Raises ``InputError`` if a part is missing.
     """
     annotation = next(iter(sorted(folder.rglob(f"gnd_{name}.pkl"))), None)
     if annotation is None:
         raise InputError(
-            f"{folder}: gnd_{name}.pkl is not there; get it from {ANNOTATION_SOURCE}/{name}"
+            f"{folder}: gnd_{name}.pkl is missing; get it from {ANNOTATION_SOURCE}/{name}"
         )
     searched, asked, queries = _read(annotation)
     found = photos_by_stem(folder)
@@ -54,7 +54,7 @@ load_rparis6k = partial(load, name="rparis6k", source=PARIS_SOURCE)
 
 
 def _read(annotation: Path) -> tuple[list[str], list[str], dict[str, tuple[Query, ...]]]:
-    """Names of the photos searched and asked with, and the queries by difficulty."""
+    """Names of the indexed photos and of the query photos, and the queries by difficulty."""
     content = read_plain_pickle(annotation)
     try:
         searched = [str(name) for name in content["imlist"]]

@@ -1,1 +1,1 @@
-"""The figures of the paper, drawn anew from any dataset."""
+"""The figures of the paper, drawn for any dataset."""

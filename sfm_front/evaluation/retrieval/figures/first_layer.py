@@ -1,4 +1,4 @@
-"""A network's first layer: its kernels and what they make of a photo, the paper's figure 2."""
+"""A network's first layer: its kernels and their responses to a photo, the paper's figure 2."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _GAP = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstLayer:
-    """``kernels`` (n, k, k, 3): weights for red, green and blue. ``responses`` (n, h, w): what is
-    left of each after the ReLU, not negative."""
+    """``kernels`` (n, k, k, 3): weights for red, green and blue. ``responses`` (n, h, w): their
+    outputs after the ReLU, not negative."""
 
     kernels: Float32Array
     responses: Float32Array
 
 
 def first_layer(network: str, weights: Path, pixels: Uint8Array) -> FirstLayer:
-    """Run ``network``, one of ``NETWORKS``, on (h, w, 3) uint8 RGB and look at its first layer.
+    """Run ``network``, one of ``NETWORKS``, on (h, w, 3) uint8 RGB and return its first layer.
 
-    Raises ``WeightsError`` where the file is broken or another network's.
+    Raises ``WeightsError`` if the file is broken or another network's.
     """
     import torch
     from torch import nn
@@ -78,7 +78,7 @@ def draw_first_layer(layer: FirstLayer, pixels: Uint8Array, title: str) -> Figur
 
 
 def mosaic(tiles: Float32Array) -> Float32Array:
-    """(n, h, w) or (n, h, w, 3) → one picture in [0, 1], near to square in tiles, white between."""
+    """(n, h, w) or (n, h, w, 3) → one picture in [0, 1]: a nearly square grid, white between."""
     columns = int(np.ceil(np.sqrt(len(tiles))))
     lines = -(-len(tiles) // columns)
     height, width = tiles.shape[1:3]

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 def results_sheet(
     method: Method, material: Material, dataset: Dataset, queries: Sequence[Query]
 ) -> Image:
-    """A row a query: its best answers, wrong ones framed red.
+    """One row per query: its best answers, wrong ones framed red.
 
-    Ignored photos are left out, and so are distractors, which nobody can look at. ``method`` has
-    been built on the photos of ``material``.
+    Ignored photos are left out, and distractors, which have no pixels. ``method`` must have been
+    built on the photos of ``material``.
     """
     return contact_sheet([_row(method, material, dataset, query) for query in queries])
 

@@ -1,4 +1,4 @@
-"""Global vectors of a dataset in a plane, as in the paper's figure 5."""
+"""Global vectors of a dataset projected to a plane, as in the paper's figure 5."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ _UNRELATED, _RELATED, _QUERY = "#b9c2cc", "#2a78b8", "#d1495b"
 
 
 class Plane:
-    """The plane through the mean of vectors in which they differ most: PCA to two dimensions."""
+    """The plane of largest variance through the mean of vectors: PCA to two dimensions."""
 
     def __init__(self, vectors: Float32Array) -> None:
-        """``vectors`` (n, d): two at least, not all equal."""
+        """``vectors`` (n, d): at least two, not all equal."""
         self._mean = vectors.mean(axis=0)
         centred = vectors - self._mean
-        # n photos are far fewer than numbers a vector: (n, n) products instead of (d, d).
+        # n is far smaller than d: (n, n) products instead of (d, d).
         variances, directions = np.linalg.eigh((centred @ centred.T).astype(np.float64))
         axes = directions[:, :-3:-1].T @ centred
         self._axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
         self.shown_variance = float(variances[-2:].sum() / variances.sum())
-        """The share of the vectors' variance that is in the plane, in [0, 1]."""
+        """The fraction of the vectors' variance in the plane, in [0, 1]."""
 
     def project(self, vectors: Float32Array) -> NDArray[np.float64]:
         """(n, d) → (n, 2)."""
@@ -40,9 +40,9 @@ class Plane:
 
 
 def draw_planes(material: Material, queries: Sequence[Query], names: Sequence[str]) -> Figure:
-    """A row a query, a column a global vector of those called ``names``.
+    """One row per query, one column per global vector in ``names``.
 
-    Photos that are ignored for a query are left out of its row.
+    Photos ignored for a query are left out of its row.
     """
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""All figures of a run, into a folder."""
+"""Write all figures of a run to a folder."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from sfm_front.types import Skipped
 from sfm_front.viewers.pictures import save
 
 NUM_QUERIES = 3
-"""Queries shown, of each dataset, chosen at random but always the same."""
+"""Queries shown per dataset, chosen at random but always the same."""
 
 
 class FigureWriter:
-    """Draws what the paper shows, for a few queries of a dataset, into a folder."""
+    """Draws the paper's figures, for a few queries per dataset, into a folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def results(self, method: Method, material: Material) -> None:
-        """``DATASET_results_METHOD.png``: what the method, built, answers (figures 6 to 9)."""
+        """``DATASET_results_METHOD.png``: answers of a built method (figures 6 to 9)."""
         for dataset in material.datasets:
             sheet = results_sheet(method, material, dataset, shown_queries(dataset, material))
             out = self._folder / f"{_file_name(dataset.name)}_results_{_file_name(method.name)}.png"
@@ -54,7 +54,7 @@ class FigureWriter:
 
 
 def shown_queries(dataset: Dataset, material: Material) -> tuple[Query, ...]:
-    """Those of the figures: of the queries that could be described and have an answer."""
+    """The queries to draw, of those that could be described and have a relevant photo."""
     usable = tuple(q for q in dataset.queries if q.relevant and key_of(q) in material.queries)
     return sampled(usable, NUM_QUERIES)
 

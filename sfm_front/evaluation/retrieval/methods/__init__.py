@@ -1,4 +1,4 @@
-"""Ways to search photos by photo, by name."""
+"""Methods to search photos by photo, by name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sfm_front.features.global_descriptors.descriptor import NAMES
 from sfm_front.runtime.worker_pool import WorkerPool
 
 NUM_TREES = 3
-"""Vocabulary trees that vote together, each learnt on other descriptors."""
+"""Number of vocabulary trees that vote together, each learnt on different descriptors."""
 
 Maker = Callable[[WorkerPool], Method]
 
@@ -43,14 +43,14 @@ METHODS: Mapping[str, Maker] = MappingProxyType(
         "ours": lambda workers: Hierarchical(workers),
     }
 )
-"""What makes each method with its own defaults."""
+"""The maker of each method with its defaults."""
 
 
 def make_method(name: str, workers: WorkerPool) -> Method:
-    """The method called ``name``, which may use these threads.
+    """The method called ``name``, which may use ``workers``.
 
-    Raises ConfigError for no such name.
+    Raises ConfigError if there is none.
     """
     if name not in METHODS:
-        raise ConfigError(f"no retrieval method is called {name!r}: take {', '.join(METHODS)}")
+        raise ConfigError(f"no retrieval method is called {name!r}: choose {', '.join(METHODS)}")
     return METHODS[name](workers)

@@ -1,4 +1,4 @@
-"""Bag of Words: visual words learnt on the indexed photos, TF-IDF, cosine by an inverted file.
+"""Bag of words: visual words learnt on the indexed photos, TF-IDF, cosine by an inverted file.
 
 Sources: Sivic and Zisserman, "Video Google: A text retrieval approach to object matching in
 videos", ICCV 2003; Philbin et al., "Object retrieval with large vocabularies and fast spatial
@@ -24,7 +24,7 @@ DESCRIPTORS_PER_WORD = 80
 MOST_WORDS = 2**16
 TRAINING_POINTS_PER_WORD = 15
 KMEANS_ROUNDS = 6
-# Of the graph that finds the nearest word: neighbours of a node, and nodes held while searching.
+# The graph that finds the nearest word (HNSW): neighbours per node, and nodes held in a search.
 _GRAPH_NEIGHBOURS = 16
 _GRAPH_BREADTH = 16
 
@@ -38,7 +38,7 @@ class BagOfWords:
     def __init__(
         self, *, num_words: int | None = None, seed: int = 0, num_threads: int = 1
     ) -> None:
-        """``num_words``: one for every ``DESCRIPTORS_PER_WORD`` indexed, by default."""
+        """``num_words``: by default, one per ``DESCRIPTORS_PER_WORD`` indexed descriptors."""
         self._num_threads = num_threads
         self._num_words = num_words
         self._seed = seed
@@ -69,7 +69,7 @@ class BagOfWords:
 
 
 def learn_words(points: Float32Array, num_words: int, seed: int) -> Any:
-    """(n, 128) float32 → a faiss index of ``num_words`` words that searches for the nearest."""
+    """(n, 128) float32 → a faiss index that finds the nearest of ``num_words`` words."""
     words = faiss.IndexHNSWFlat(points.shape[1], _GRAPH_NEIGHBOURS)
     words.hnsw.efSearch = _GRAPH_BREADTH
     clustering = faiss.Clustering(points.shape[1], num_words)
@@ -81,7 +81,7 @@ def learn_words(points: Float32Array, num_words: int, seed: int) -> Any:
 
 
 class InvertedFile:
-    """For each word, the photos that show it and how much it counts there."""
+    """For each word, the photos with it and its weight there."""
 
     def __init__(self, words_of_photos: Sequence[NDArray[np.int64]], num_words: int) -> None:
         """``words_of_photos``: the word of each descriptor of each photo."""
@@ -90,7 +90,7 @@ class InvertedFile:
         in_photos = np.bincount(
             np.concatenate([words for words, _ in counted]), minlength=num_words
         )
-        # A word that no photo has can be in a query; it then counts for its length alone.
+        # A query may have a word that no photo has; it only adds to the query's length.
         self._idf = np.log((1 + self._num_photos) / (1 + in_photos)) + 1
         word = np.concatenate([words for words, _ in counted])
         photo = np.repeat(np.arange(len(counted)), [len(words) for words, _ in counted])
@@ -104,7 +104,7 @@ class InvertedFile:
         """The word of each descriptor of a query → its cosine with each photo."""
         distinct, counts = np.unique(words, return_counts=True)
         lengths = self._starts[distinct + 1] - self._starts[distinct]
-        # The places of each word's run, one run after the other.
+        # The positions in each word's run, one run after the other.
         places = np.arange(lengths.sum()) + np.repeat(
             self._starts[distinct] - (np.cumsum(lengths) - lengths), lengths
         )
@@ -115,7 +115,7 @@ class InvertedFile:
         return sums.astype(np.float64)
 
     def _weights(self, words: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.float64]:
-        """A photo's TF-IDF at length 1. Its number of words drops out."""
+        """A photo's TF-IDF at length 1, so that its number of words cancels."""
         weights = counts * self._idf[words]
         unit: NDArray[np.float64] = weights / max(float(np.linalg.norm(weights)), 1e-12)
         return unit

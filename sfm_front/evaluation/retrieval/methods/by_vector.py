@@ -12,7 +12,7 @@ class ByVector:
     """Ranks all photos by the cosine of their global vectors, exactly."""
 
     def __init__(self, name: str) -> None:
-        """``name``: that of the method and of the vectors in ``BenchPhoto.vectors``."""
+        """``name`` of the method and of its vectors in ``BenchPhoto.vectors``."""
         self.name = name
         self.global_vectors = (name,)
 

@@ -1,4 +1,4 @@
-"""The yardstick: match the query with every photo, on all features, and verify."""
+"""The reference: match the query with every photo, on all features, and verify."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Exhaustive:
                 query.view.features.descriptors, other.features.descriptors, self._matching
             )
             inliers = self._verifier.count_inliers(query.view, other, matches)
-            # Fewer than a thousandth of an inlier: matches only break ties.
+            # Matches count less than one inlier in total: they only break ties.
             tie_break = len(matches) / (1000 * (1 + len(query.view.features)))
             return Ranked(other.image_id, inliers + tie_break, inliers=inliers)
 

@@ -20,7 +20,7 @@ from sfm_front.runtime.worker_pool import WorkerPool
 
 
 class Hierarchical:
-    """The session's retriever, asked for all photos."""
+    """The session's retriever, ranking all photos."""
 
     name = "ours"
 

@@ -1,4 +1,4 @@
-"""Several methods asked at once, their rankings joined by votes."""
+"""Several methods, their rankings joined by votes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sfm_front.evaluation.retrieval.types import BenchPhoto, Method, Ranked, Sta
 from sfm_front.runtime.stopwatch import Stopwatch
 
 _DAMPING = 60
-"""Ranks well below this count nearly alike; the value is the source's."""
+"""Ranks well below this count almost equally; the value is the source's."""
 
 
 class Joined:

@@ -11,7 +11,7 @@ from sfm_front.evaluation.retrieval.types import BenchPhoto, Ranked
 
 
 class ByPerceptualHash:
-    """Ranks all photos by the number of equal bits; the score is their share."""
+    """Ranks all photos by the number of equal bits; the score is their fraction."""
 
     name = "phash"
     global_vectors = ()

@@ -11,12 +11,12 @@ from sfm_front.evaluation.retrieval.types import BenchPhoto
 from sfm_front.types import Float32Array
 
 FEWEST_WORDS = 1024
-"""With fewer, every photo of a small collection has every word, and none tells them apart."""
+"""With fewer, every photo of a small collection has every word, and none distinguishes them."""
 
 
 def num_words_for(photos: Sequence[BenchPhoto], *, per_word: int, most: int) -> int:
-    """One word for ``per_word`` descriptors of these photos: ``FEWEST_WORDS`` to ``most``, but
-    never more than there are descriptors. Raises ConfigError where there are none."""
+    """One word per ``per_word`` descriptors of these photos: ``FEWEST_WORDS`` to ``most``, but
+    never more than descriptors. Raises ConfigError if there are no descriptors."""
     total = sum(len(photo.view.features) for photo in photos)
     if total == 0:
         raise ConfigError("none of the photos has features: there are no visual words to learn")
@@ -24,7 +24,7 @@ def num_words_for(photos: Sequence[BenchPhoto], *, per_word: int, most: int) -> 
 
 
 def sample_descriptors(photos: Sequence[BenchPhoto], count: int, seed: int) -> Float32Array:
-    """(n, 128) float32 RootSIFT: ``count`` drawn from all photos, or all where there are fewer."""
+    """(n, 128) float32 RootSIFT: ``count`` drawn from all photos, or all if there are fewer."""
     sizes = [len(photo.view.features) for photo in photos]
     total = sum(sizes)
     drawn = np.arange(total)

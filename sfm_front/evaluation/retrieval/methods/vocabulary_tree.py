@@ -30,11 +30,11 @@ _EMBEDDING_DIMENSION = 64
 
 class VocabularyTree:
     """Ranks all photos by COLMAP's score; ``Ranked.score`` is the reciprocal of the rank, because
-    pycolmap tells the order alone. Its own geometric verification is off.
+    pycolmap returns only the order. COLMAP's geometric verification is off.
 
-    The Python binding of ``VisualIndex.query`` drops its answer. COLMAP's pair generator asks the
-    same index and returns it, but loads the index from a file for each query: ``seconds`` leaves
-    that out.
+    The Python binding of ``VisualIndex.query`` drops its result. COLMAP's pair generator queries
+    the same index and returns it, but loads the index from a file for each query: ``seconds``
+    excludes that.
     """
 
     name = "vocabulary_tree"
@@ -43,15 +43,15 @@ class VocabularyTree:
     def __init__(
         self, *, num_words: int | None = None, seed: int = 0, num_threads: int = 1
     ) -> None:
-        """``num_words``: one for every ``DESCRIPTORS_PER_WORD`` indexed, by default.
+        """``num_words``: by default, one per ``DESCRIPTORS_PER_WORD`` indexed descriptors.
 
-        ``seed``: of the descriptors that words are learnt from.
+        ``seed`` draws the descriptors that words are learnt from.
         """
         self._num_words = num_words
         self._seed = seed
         self._num_threads = num_threads
         self.seconds: Mapping[str, float] = {}
-        """Of the last query, without loading the index."""
+        """Seconds of the last query, without loading the index."""
 
     def build(self, photos: Sequence[BenchPhoto]) -> None:
         num_words = self._num_words or num_words_for(
@@ -71,7 +71,7 @@ class VocabularyTree:
         options = pycolmap.VisualIndex.IndexOptions(num_threads=self._num_threads)
         for photo in photos:
             features = photo.view.features
-            # Only verification, which is off, would look at where they are.
+            # Only verification, which is off, needs their positions.
             keypoints = pycolmap.FeatureKeypoints([pycolmap.FeatureKeypoint()] * len(features))
             index.add(
                 options,
@@ -87,7 +87,7 @@ class VocabularyTree:
 
     def rank(self, query: BenchPhoto) -> list[Ranked]:
         clock = Stopwatch()
-        # Under the id of a photo that is indexed, so that the query is not added to the index.
+        # Under an indexed photo's id, so that the query is not added to the index.
         query_id = self._ids[0]
         options = pycolmap.VocabTreePairingOptions(
             num_images=len(self._ids),
@@ -110,7 +110,7 @@ def _descriptors(points: Float32Array) -> pycolmap.FeatureDescriptorsFloat:
 
 
 def _database_of(features: Features, image_id: int) -> pycolmap.Database:
-    """A database in memory with one photo, as little of it as COLMAP needs for a query."""
+    """An in-memory database with the minimum that COLMAP needs to query one photo."""
     database = pycolmap.Database.open(":memory:")
     camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_PINHOLE", 1.0, 1, 1)
     image = pycolmap.Image(name="query", camera_id=1, image_id=image_id)
