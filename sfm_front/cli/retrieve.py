@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     output = parser.add_argument_group("output")
     output.add_argument(
-        "--top", type=int, default=10, metavar="N", help="rows of the table (default: 10)"
+        "--top", type=int, default=10, metavar="N", help="rows of the table (default: %(default)s)"
     )
     output.add_argument(
         "--json",
