@@ -160,7 +160,8 @@ assert set(blas().values()) == {1}, blas()
 second.__exit__(None, None, None)
 assert blas() == fresh | alone, (blas(), fresh, alone)
 """
-    subprocess.run([sys.executable, "-c", code], check=True, env=module_environment())
+    environment = module_environment() | {"OMP_NUM_THREADS": "2"}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
 
 
 def test_workers_that_nobody_closed_give_the_cores_back():
