@@ -19,6 +19,9 @@ Float64Array = NDArray[np.float64]
 Uint8Array = NDArray[np.uint8]
 Uint32Array = NDArray[np.uint32]
 
+DESCRIPTOR_NORM = 512.0
+"""Length of a RootSIFT descriptor as COLMAP stores it, but for what rounding takes."""
+
 
 class SkipReason(Enum):
     """Why a file given as a photo is not used."""
@@ -143,11 +146,6 @@ class View:
     def points(self, indices: NDArray[Any]) -> Float64Array:
         """(K, 2) pixels of the keypoints with these indices."""
         return self.features.keypoints[indices, :2].astype(np.float64)
-
-    def rays(self, indices: NDArray[Any]) -> Float64Array:
-        """(K, 3) directions in the camera, z = 1; nan where undistortion fails."""
-        undistorted = self.camera.cam_from_img(self.points(indices))
-        return np.column_stack([np.asarray(undistorted, np.float64), np.ones(len(indices))])
 
 
 @dataclass(frozen=True, slots=True)

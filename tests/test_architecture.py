@@ -31,12 +31,6 @@ FLOORS = (
     ("types", "errors", "version"),
 )
 
-# (importing module, imported module) → why it may point up all the same.
-EXCEPTIONS = {
-    ("sfm_front.runtime.subprocess_env", "sfm_front"): "asks only where the package lies",
-    ("sfm_front.search.photo_index", "sfm_front.cli.progress"): "reports progress by CountLine",
-}
-
 # Most follow from the floors; they are spelled out so that a new floor plan cannot lose them.
 NEVER = {
     "mapping": ("retrieval", "features"),
@@ -218,9 +212,8 @@ def imports() -> list[Import]:
 
 @pytest.fixture(scope="module")
 def arrows(imports: list[Import]) -> list[Import]:
-    """Imports between rooms, without the exceptions."""
-    found = between_rooms(imports, PACKAGE.name)
-    return [arrow for arrow in found if (arrow.importer, arrow.imported) not in EXCEPTIONS]
+    """Imports between rooms."""
+    return between_rooms(imports, PACKAGE.name)
 
 
 def test_every_room_has_a_floor() -> None:
@@ -242,12 +235,6 @@ def test_rooms_that_must_not_know_each_other_do_not(arrows: list[Import]) -> Non
 def test_nothing_outside_the_evaluation_imports_it(arrows: list[Import]) -> None:
     wrong = [arrow for arrow in arrows if room_of(arrow.imported) == "evaluation"]
     assert not wrong, listing(wrong)
-
-
-def test_exceptions_are_still_needed(imports: list[Import]) -> None:
-    wrong = not_pointing_down(between_rooms(imports, PACKAGE.name), FLOORS)
-    stale = EXCEPTIONS.keys() - {(found.importer, found.imported) for found in wrong}
-    assert not stale, f"take these off EXCEPTIONS: {sorted(stale)}"
 
 
 def test_no_modules_import_each_other_in_a_circle(imports: list[Import]) -> None:

@@ -37,7 +37,7 @@ def add_machine(group: argparse._ActionsContainer) -> None:
     """Declare what of the machine is used."""
     group.add_argument(
         "--device",
-        help="of networks and matching: auto (default: a GPU where PyTorch can use one), cpu, cuda",
+        help="of networks and matching: auto (default), cpu or cuda; auto means a GPU if usable",
     )
     group.add_argument("--threads", type=int, metavar="N", help="cores to use (default: all)")
 

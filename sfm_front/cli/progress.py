@@ -70,22 +70,18 @@ class ProgressLine(LiveLine):
 
 
 class CountLine(LiveLine):
-    """How many of ``total`` photos are done; where there is no terminal, a line each tenth."""
+    """How many photos are done; where there is no terminal, a line each tenth."""
 
-    def __init__(self, what: str, total: int, stream: TextIO) -> None:
+    def __init__(self, what: str, stream: TextIO) -> None:
         super().__init__(stream)
         self._what = what
-        self._total = total
         self._started = time.perf_counter()
-        self._done = 0
 
-    def count(self) -> None:
-        """Count a photo and show where things stand."""
-        self._done += 1
-        tenths_before, tenths = (10 * n // self._total for n in (self._done - 1, self._done))
+    def show(self, done: int, total: int) -> None:
+        """To be called after each photo."""
+        tenths_before, tenths = (10 * n // total for n in (done - 1, done))
         if self._live or tenths > tenths_before:
-            pace = _pace(self._started, self._done, self._total)
-            self._write(f"{self._what} {self._done}/{self._total}  {pace}")
+            self._write(f"{self._what} {done}/{total}  {_pace(self._started, done, total)}")
 
 
 def _pace(started: float, done: int, total: int) -> str:

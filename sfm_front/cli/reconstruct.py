@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     photos = parser.add_argument_group("photos")
     photos.add_argument(
-        "--order", default="name", help="name, time of capture, or random (default: name)"
+        "--order", default="name", help="name, time of capture, or random (default: %(default)s)"
     )
     photos.add_argument(
         "--seed",

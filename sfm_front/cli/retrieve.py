@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     output = parser.add_argument_group("output")
     output.add_argument(
-        "--top", type=int, default=10, metavar="N", help="rows of the table (default: 10)"
+        "--top", type=int, default=10, metavar="N", help="rows of the table (default: %(default)s)"
     )
     output.add_argument(
         "--json",
@@ -172,11 +172,9 @@ def _describer(options: SessionOptions, location: Path, device: str) -> CachedEx
 
 def _update(index: PhotoIndex, photos: Sequence[PhotoPath], threads: int) -> None:
     """Bring the index up to date and tell what that took."""
-    update = index.update(
-        photos,
-        num_threads=threads,
-        progress=lambda missing: CountLine("indexing photo", missing, sys.stderr),
-    )
+    line = CountLine("indexing photo", sys.stderr)
+    update = index.update(photos, num_threads=threads, progress=line.show)
+    line.end()
     _note(str(update))
     for skipped in update.skipped[:_MOST_SKIPPED_TOLD]:
         _note(f"skipped {skipped.name}: {skipped}")

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
-from sfm_front.types import Features, Float32Array, Photo, Uint8Array
+from sfm_front.types import DESCRIPTOR_NORM, Features, Float32Array, Photo, Uint8Array
 
-DESCRIPTOR_SCALE = 512.0
 # Keypoints described, by response, per keypoint kept, by scale.
 _DESCRIBED_PER_KEPT = 4
 # Smaller photos have few keypoints: COLMAP's lower contrast threshold finds fainter ones. Larger
@@ -79,7 +78,7 @@ def root_sift(raw: Float32Array) -> Uint8Array:
     retrieval", CVPR 2012; quantised as COLMAP stores descriptors.
     """
     total = np.maximum(raw.sum(axis=1, keepdims=True), 1e-9)
-    scaled = np.rint(np.sqrt(raw / total) * DESCRIPTOR_SCALE)
+    scaled = np.rint(np.sqrt(raw / total) * DESCRIPTOR_NORM)
     quantised: Uint8Array = np.minimum(scaled, 255).astype(np.uint8)
     return quantised
 

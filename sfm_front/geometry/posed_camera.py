@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pycolmap
 
+from sfm_front.geometry.rays import undistorted_rays
 from sfm_front.types import Float32Array, Float64Array
 
 
@@ -27,8 +28,7 @@ class PosedCamera:
 
         nan where undistortion fails.
         """
-        undistorted = self.camera.cam_from_img(keypoints[:, :2].astype(np.float64))
-        rays = np.column_stack([np.asarray(undistorted, np.float64), np.ones(len(keypoints))])
+        rays = undistorted_rays(self.camera, keypoints[:, :2].astype(np.float64))
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         directions: Float64Array = rays @ self.cam_from_world.rotation.matrix()
         return directions

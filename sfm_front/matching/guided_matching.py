@@ -13,11 +13,9 @@ from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.matching.epipolar import EpipolarPlanes
 from sfm_front.matching.in_plane_rotation import agrees_with_rotation
 from sfm_front.matching.nearest_neighbors import MatchingOptions, match_masked
-from sfm_front.matching.verification import VerificationOptions
+from sfm_front.matching.verification import CALIBRATED, VerificationOptions
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.types import Float64Array, PairGeometry, RankedCandidate, View
-
-_CALIBRATED = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +123,7 @@ def _side(view: View, posed: PosedCamera) -> _Side:
 def two_view_geometry(posed1: PosedCamera, posed2: PosedCamera) -> pycolmap.TwoViewGeometry:
     """As COLMAP has it for calibrated photos: the relative pose with a translation of length 1."""
     geometry = pycolmap.TwoViewGeometry()
-    geometry.config = _CALIBRATED
+    geometry.config = CALIBRATED
     pose = posed1.relative(posed2)
     pose.translation = pose.translation / np.linalg.norm(pose.translation)
     geometry.cam2_from_cam1 = pose

@@ -9,9 +9,9 @@ import numpy as np
 from sfm_front.errors import ConfigError
 from sfm_front.matching.in_plane_rotation import rotation_mask
 from sfm_front.matching.match_mask import MaskBlock, MatchMask
-from sfm_front.types import Features, Float32Array, Uint8Array, Uint32Array
+from sfm_front.types import DESCRIPTOR_NORM, Features, Float32Array, Uint8Array, Uint32Array
 
-SQUARED_NORM = 512.0**2
+SQUARED_NORM = DESCRIPTOR_NORM**2
 # Rows of similarities that stay in the CPU cache between passes (TUNING: row-block).
 _BLOCK = 256
 NO_MATCHES: Uint32Array = np.zeros((0, 2), np.uint32)

@@ -10,6 +10,7 @@ import pycolmap
 from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
+from sfm_front.geometry.rays import undistorted_rays
 from sfm_front.types import (
     Float64Array,
     PairGeometry,
@@ -20,7 +21,7 @@ from sfm_front.types import (
 )
 
 _WATERMARK = int(pycolmap.TwoViewGeometryConfiguration.WATERMARK)
-_WITH_ESSENTIAL_MATRIX = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
+CALIBRATED = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +98,7 @@ class Verifier:
             return rejected(Rejection.WATERMARK, len(geometry.inlier_matches))
         if len(geometry.inlier_matches) < options.min_inliers:
             return rejected(Rejection.TOO_FEW_INLIERS, len(geometry.inlier_matches))
-        if geometry.config == _WITH_ESSENTIAL_MATRIX and geometry.E is not None:
+        if geometry.config == CALIBRATED and geometry.E is not None:
             consistent = self._essential_inliers(geometry.E, view1, view2, matches)
             if np.count_nonzero(consistent) > len(survivors):
                 survivors = np.flatnonzero(consistent)
@@ -144,8 +145,8 @@ class Verifier:
         self, essential: Float64Array, view1: View, view2: View, matches: Uint32Array
     ) -> NDArray[np.bool_]:
         """(M,) matches whose Sampson error under x2ᵀ E x1 = 0 is within max_error_px."""
-        rays1 = view1.rays(matches[:, 0])
-        rays2 = view2.rays(matches[:, 1])
+        rays1 = undistorted_rays(view1.camera, view1.points(matches[:, 0]))
+        rays2 = undistorted_rays(view2.camera, view2.points(matches[:, 1]))
         lines2 = rays1 @ essential.T
         lines1 = rays2 @ essential
         algebraic = np.einsum("ij,ij->i", rays2, lines2)

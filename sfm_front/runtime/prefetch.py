@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
 from itertools import islice
 from typing import TypeVar
 
-import cv2
-from threadpoolctl import threadpool_limits
+from sfm_front.runtime.thread_limits import limit_this_thread, single_threaded_calls
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -21,14 +19,14 @@ def prefetch(
 ) -> Generator[Result, None, None]:
     """Results in the items' order, computed at most ``2 * num_threads`` ahead.
 
-    Until the generator ends or is closed, matrix products and OpenCV run on the calling thread
-    alone: split over all cores, they would make the threads wait for each other.
+    Until the last one, or until it is closed, matrix products and OpenCV run on the thread that
+    asks for them.
     """
     source = iter(items)
     ahead: deque[Future[Result]] = deque()
     with (
-        _undivided_calls(),
-        ThreadPoolExecutor(num_threads, "sfm-ahead", threadpool_limits, (1, "openmp")) as pool,
+        single_threaded_calls(opencv=True),
+        ThreadPoolExecutor(num_threads, "sfm-ahead", limit_this_thread) as pool,
     ):
         try:
             while True:
@@ -40,14 +38,3 @@ def prefetch(
         finally:
             for future in ahead:
                 future.cancel()
-
-
-@contextmanager
-def _undivided_calls() -> Iterator[None]:
-    opencv_threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        with threadpool_limits(1):
-            yield
-    finally:
-        cv2.setNumThreads(opencv_threads)

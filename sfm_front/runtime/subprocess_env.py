@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import sfm_front
+_PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 
 
 def module_environment() -> dict[str, str]:
     """This process's environment, in which ``python -m sfm_front...`` also works uninstalled."""
     environment = dict(os.environ)
-    package_root = str(Path(sfm_front.__file__).resolve().parents[1])
-    search = [package_root, *filter(None, [environment.get("PYTHONPATH")])]
+    search = [str(_PACKAGE_ROOT), *filter(None, [environment.get("PYTHONPATH")])]
     environment["PYTHONPATH"] = os.pathsep.join(search)
     return environment

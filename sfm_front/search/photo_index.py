@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sfm_front.cli.progress import CountLine
 from sfm_front.errors import InputError
 from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto
 from sfm_front.features.feature_cache import CacheKeys
@@ -75,12 +74,12 @@ class PhotoIndex(Mapping[int, View]):
         photos: Sequence[PhotoPath],
         *,
         num_threads: int,
-        progress: Callable[[int], CountLine],
+        progress: Callable[[int, int], None] | None = None,
     ) -> Update:
         """Extract new and changed photos, forget missing ones, and write the index.
 
-        ``progress`` is called with the number of photos to extract and returns the line that counts
-        them. Raises InputError if the index cannot be written.
+        ``progress`` is told how many photos are described, and of how many, after each. Raises
+        InputError where the index cannot be written.
         """
         old, discarded = self._load()
         now = {photo.name: _entry(photo) for photo in photos}
@@ -92,13 +91,12 @@ class PhotoIndex(Mapping[int, View]):
             else:
                 missing.append(photo)
         num_described = 0
-        line = progress(len(missing))
         described = self._describer.stream(missing, num_threads=num_threads)
-        for photo, result in zip(missing, described, strict=True):
+        for done, (photo, result) in enumerate(zip(missing, described, strict=True), 1):
             now[photo.name] = _completed(now[photo.name], result)
             num_described += isinstance(result, CachedPhoto)
-            line.count()
-        line.end()
+            if progress is not None:
+                progress(done, len(missing))
         self._save(now)
         self.photos = dict(enumerate((p for p in photos if not now[p.name].skipped), 1))
         self._digests = {i: now[photo.name].digest for i, photo in self.photos.items()}

@@ -7,14 +7,16 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from helpers.locations import ROOT
 from PIL import Image
 
-from sfm_front.cli import reconstruct
+from sfm_front.cli import reconstruct, retrieve
 from sfm_front.cli.main import main
-from sfm_front.session.options import SessionOptions
+from sfm_front.search.folder_search import SearchOptions
+from sfm_front.session.options import SessionOptions, available_cores
 
 HEAVY = ("torch", "pycolmap", "cv2", "open3d", "faiss")
 
@@ -52,29 +54,44 @@ def test_the_script_is_the_command():
     assert "--max-image-size" in done.stdout
 
 
-def parser() -> argparse.ArgumentParser:
+def parser(command: ModuleType = reconstruct) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser()
-    reconstruct.add_arguments(made)
+    command.add_arguments(made)
     return made
 
 
-@pytest.mark.parametrize(
-    ("argument", "default"),
-    [
-        ("--max-image-size", SessionOptions().max_image_size),
-        ("--max-features", SessionOptions().max_features),
-        ("--seed", SessionOptions().seed),
-        ("--camera-mode", SessionOptions().cameras.mode),
-        ("--camera-model", SessionOptions().cameras.model),
-        ("--global-descriptor", SessionOptions().global_descriptor),
-        ("--candidates", SessionOptions().retrieval.candidates),
-        ("--matched", SessionOptions().pair_matching.num_matched),
-    ],
-)
-def test_help_tells_the_defaults_of_a_session(argument, default):
-    (told,) = (action.help for action in parser()._actions if argument in action.option_strings)
-    values = re.findall(r"\(default: ([^)]*)\)|(\S+) \(default\)", told)
-    assert [first or second for first, second in values] == [str(default)]
+SESSION = SessionOptions()
+# The help does not read these: the modules that hold them load heavy libraries.
+DEFAULTS = {
+    "--max-image-size": SESSION.max_image_size,
+    "--max-features": SESSION.max_features,
+    "--global-descriptor": SESSION.global_descriptor,
+    "--candidates": SESSION.retrieval.candidates,
+    "--device": SESSION.device,
+    "--threads": "all" if SESSION.threads == available_cores() else SESSION.threads,
+}
+DEFAULTS_OF = {
+    reconstruct: DEFAULTS
+    | {
+        "--seed": SESSION.seed,
+        "--camera-mode": SESSION.cameras.mode,
+        "--camera-model": SESSION.cameras.model,
+        "--num-matched": SESSION.pair_matching.num_matched,
+    },
+    retrieve: DEFAULTS | {"--method": SearchOptions().method},
+}
+
+
+@pytest.mark.parametrize("command", [reconstruct, retrieve])
+def test_help_tells_the_defaults_of_the_options_and_no_others(command):
+    told = {}
+    for action in parser(command)._actions:
+        # What argparse fills in is the command's own; outputs/NAME follows from the folder.
+        text = (action.help or "").replace("(default: outputs/NAME", "").replace("%(default)s", "")
+        if "default" in text.replace("(default: )", ""):
+            (found,) = re.findall(r"\(default: ([^)]*)\)|(\S+) \(default\)", text)
+            told[action.option_strings[0]] = "".join(found)
+    assert told == {option: str(value) for option, value in DEFAULTS_OF[command].items()}
 
 
 def test_the_seed_is_the_sessions_where_none_is_given():

@@ -101,10 +101,10 @@ def test_what_becomes_of_models_is_no_photo(turn):
 
 def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):
     stream = io.StringIO()
-    line = CountLine("indexing photo", 40, stream)
-    for _ in range(40):
+    line = CountLine("indexing photo", stream)
+    for done in range(1, 41):
         turn(0.5)
-        line.count()
+        line.show(done, 40)
     line.end()
     lines = stream.getvalue().splitlines()
     assert len(lines) == 10
@@ -114,9 +114,9 @@ def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):
 
 def test_counting_on_a_terminal_renews_one_line_and_leaves_none():
     terminal = Terminal()
-    line = CountLine("indexing photo", 3, terminal)
-    for _ in range(3):
-        line.count()
+    line = CountLine("indexing photo", terminal)
+    for done in (1, 2, 3):
+        line.show(done, 3)
     line.end()
     assert "\n" not in terminal.getvalue()
     assert "indexing photo 2/3" in terminal.getvalue()
@@ -125,7 +125,7 @@ def test_counting_on_a_terminal_renews_one_line_and_leaves_none():
 
 def test_counting_a_few_photos_without_a_terminal_names_each():
     stream = io.StringIO()
-    line = CountLine("photo", 3, stream)
-    for _ in range(3):
-        line.count()
+    line = CountLine("photo", stream)
+    for done in (1, 2, 3):
+        line.show(done, 3)
     assert [text.split()[1] for text in stream.getvalue().splitlines()] == ["1/3", "2/3", "3/3"]

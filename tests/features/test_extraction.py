@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from helpers.library_threads import library_threads, several_threads
 from PIL import Image
 
 from sfm_front.features.extraction import FeatureExtraction
@@ -142,17 +143,13 @@ def test_no_more_photos_are_taken_than_are_worked_on(photos):
 
 def test_a_stream_that_is_still_held_ends_with_its_describer(photos):
     """Else OpenCV would stay on one thread."""
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(3)
-    try:
+    with several_threads() as before:
         with describer(2) as describe:
             stream = describe.stream(photos)
             next(stream)
             assert cv2.getNumThreads() == 1
-        assert cv2.getNumThreads() == 3
+        assert library_threads() == before
         assert list(stream) == []
-    finally:
-        cv2.setNumThreads(before)
 
 
 def test_a_file_that_is_gone_is_skipped(tmp_path: Path):

@@ -6,9 +6,8 @@ import threading
 import time
 from collections.abc import Iterator
 
-import cv2
 import pytest
-from threadpoolctl import threadpool_info, threadpool_limits
+from helpers.library_threads import library_threads, needs_blas, several_threads
 
 from sfm_front.runtime.prefetch import prefetch
 
@@ -54,14 +53,7 @@ def test_an_error_reaches_the_caller_in_its_turn():
         next(results)
 
 
-def library_threads() -> tuple[int, set[int]]:
-    """How many threads OpenCV and matrix products run on."""
-    blas = {
-        library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"
-    }
-    return cv2.getNumThreads(), blas
-
-
+@needs_blas
 @pytest.mark.parametrize("end", ["last result", "closed", "error"])
 def test_libraries_run_on_one_thread_until_the_end(end):
     def use(item: int) -> tuple[int, set[int]]:
@@ -69,23 +61,18 @@ def test_libraries_run_on_one_thread_until_the_end(end):
             raise ValueError
         return library_threads()
 
-    opencv_before = cv2.getNumThreads()
-    cv2.setNumThreads(3)
-    try:
-        with threadpool_limits(2, user_api="blas"):
-            results = prefetch(use, range(3), num_threads=2)
-            assert next(results) == (1, {1})
-            assert library_threads() == (1, {1})
-            if end == "last result":
-                assert list(results) == [(1, {1})] * 2
-            elif end == "closed":
-                results.close()
-            else:
-                with pytest.raises(ValueError):  # noqa: PT011
-                    next(results)
-            assert library_threads() == (3, {2})
-    finally:
-        cv2.setNumThreads(opencv_before)
+    with several_threads() as before:
+        results = prefetch(use, range(3), num_threads=2)
+        assert next(results) == (1, {1})
+        assert library_threads() == (1, {1})
+        if end == "last result":
+            assert list(results) == [(1, {1})] * 2
+        elif end == "closed":
+            results.close()
+        else:
+            with pytest.raises(ValueError):  # noqa: PT011
+                next(results)
+        assert library_threads() == before
 
 
 def test_closed_early_it_starts_nothing_more():

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import threading
 
-import numpy as np
 import pytest
-import threadpoolctl
+from helpers.library_threads import blas_threads, library_threads, needs_blas, several_threads
 
 from sfm_front.runtime.worker_pool import WorkerPool
 
@@ -39,30 +38,26 @@ def test_several_threads_work_side_by_side():
         assert sorted(workers.map(lambda _: meeting.wait(10), range(3))) == [0, 1, 2]
 
 
-def blas_threads() -> set[int]:
-    np.ones((2, 2)) @ np.ones((2, 2))  # whatever was imported before, BLAS is there
-    libraries = threadpoolctl.threadpool_info()
-    return {library["num_threads"] for library in libraries if library["user_api"] == "blas"}
-
-
+@needs_blas
 def test_matrix_products_stay_on_their_thread_while_the_workers_are_there():
-    with threadpoolctl.threadpool_limits(2, user_api="blas"):
-        before = blas_threads()
+    with several_threads() as before:
         with WorkerPool(2) as workers:
             assert workers.map(lambda _: blas_threads(), range(4)) == [{1}] * 4
-        assert blas_threads() == before != {1}
+        assert library_threads() == before
 
 
+@needs_blas
 def test_the_last_workers_to_be_closed_give_the_cores_back():
-    with threadpoolctl.threadpool_limits(2, user_api="blas"):
-        before = blas_threads()
+    with several_threads() as before:
         first, second = WorkerPool(1), WorkerPool(1)
         first.close()
         assert blas_threads() == {1}
+        first.close()
+        assert blas_threads() == {1}
         second.close()
-        assert blas_threads() == before != {1}
+        assert library_threads() == before
         second.close()
-        assert blas_threads() == before
+        assert library_threads() == before
 
 
 @pytest.mark.parametrize("num_threads", [1, 2])

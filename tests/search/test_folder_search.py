@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers import photo_files
 
-from sfm_front.cli.progress import CountLine
 from sfm_front.errors import ConfigError
 from sfm_front.features.cached_extraction import CachedExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
@@ -42,11 +40,7 @@ class World:
             {"vlad": GlobalDescriptor(local=[Vlad()])},
         )
         self.index = PhotoIndex(folder / "index", self.describer)
-        self.index.update(
-            list_photos(self.photos),
-            num_threads=1,
-            progress=lambda total: CountLine("photo", total, io.StringIO()),
-        )
+        self.index.update(list_photos(self.photos), num_threads=1)
 
     def described(self, path: Path) -> ExtractedPhoto:
         return self.describer.describe(PhotoPath(path.name, path)).photo

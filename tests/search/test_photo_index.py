@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 from pathlib import Path
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 from helpers import photo_files
 
-from sfm_front.cli.progress import CountLine
 from sfm_front.errors import InputError
 from sfm_front.features.cached_extraction import CachedExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
@@ -40,11 +38,7 @@ def update(folder: Path, *, max_features: int = 200) -> tuple[PhotoIndex, Update
         {"vlad": GlobalDescriptor(local=[Vlad()])},
     )
     index = PhotoIndex(location, describer)
-    done = index.update(
-        list_photos(folder),
-        num_threads=2,
-        progress=lambda total: CountLine("photo", total, io.StringIO()),
-    )
+    done = index.update(list_photos(folder), num_threads=2)
     return index, done
 
 
@@ -64,6 +58,20 @@ def test_a_folder_is_described_once(folder):
     again, second = update(folder)
     assert second == Update(kept=4, described=0, removed=0, skipped=())
     assert names(again) == list(NAMES)
+
+
+def test_progress_counts_what_is_described(folder):
+    location = folder.parent / "index"
+    describer = CachedExtraction(
+        location, PhotoReader(), SiftExtractor(200), {"vlad": GlobalDescriptor(local=[Vlad()])}
+    )
+    told: list[tuple[int, int]] = []
+    photos = list_photos(folder)
+    for known in (photos[:1], photos):
+        PhotoIndex(location, describer).update(
+            known, num_threads=1, progress=lambda done, total: told.append((done, total))
+        )
+    assert told == [(1, 1), (1, 3), (2, 3), (3, 3)]
 
 
 def test_views_and_vectors_are_those_of_the_photos(folder):

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 import pytest
+from helpers.library_threads import library_threads, needs_blas, several_threads
+from helpers.photo_files import save
 from helpers.photo_stream import described, position_errors_m, registered_names, true_matches
 
 from sfm_front.errors import ConfigError, InputError
@@ -28,10 +30,9 @@ from sfm_front.events import (
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.model import MapperOptions
 from sfm_front.photos.cameras import CameraOptions
-from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
-from sfm_front.types import ModelSummary, Skipped, SkipReason
+from sfm_front.types import ModelSummary, PhotoPath, Skipped, SkipReason
 
 NUM_PHOTOS = 16
 # The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
@@ -310,6 +311,7 @@ def test_the_package_offers_the_session():
     assert Offered is Session
 
 
+@needs_blas
 def test_what_is_open_is_closed_if_a_later_part_cannot_be_made(tmp_path, monkeypatch):
     """The limit on BLAS threads is the process's: a session that never began must not keep it."""
 
@@ -317,10 +319,26 @@ def test_what_is_open_is_closed_if_a_later_part_cannot_be_made(tmp_path, monkeyp
         raise OSError("no database here")
 
     monkeypatch.setattr("sfm_front.session.session.PhotoDatabase", fail)
-    before = WorkerPool._num_open
-    with pytest.raises(OSError, match="no database here"):
-        Session(tmp_path / "out", options(2))
-    assert WorkerPool._num_open == before
+    with several_threads() as before:
+        with pytest.raises(OSError, match="no database here"):
+            Session(tmp_path / "out", options(2))
+        assert library_threads() == before
+
+
+@needs_blas
+@pytest.mark.parametrize("closed_first", [0, 1])
+def test_two_sessions_at_once_share_the_limits(tmp_path, closed_first):
+    names = [f"{seed}_0.png" for seed in range(6)]
+    photos = [PhotoPath(path.name, path) for path in save(tmp_path / "photos", *names)]
+    with several_threads() as before:
+        sessions = [Session(tmp_path / name, options(2)) for name in ("first", "second")]
+        streams = [session.add_all(photos) for session in sessions]
+        for stream in streams:
+            assert next(stream).skipped is None
+        sessions[closed_first].close()
+        assert library_threads() == (1, {1})
+        sessions[1 - closed_first].close()
+        assert library_threads() == before
 
 
 def test_a_finished_session_takes_no_more_photos(orbit, tmp_path):
