@@ -15,6 +15,8 @@ from sfm_front.reports.explanation import pair_matches
 
 NAMES = ("0001.jpg", "0002.jpg", "0003.jpg", "0010.jpg", "0011.jpg")
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

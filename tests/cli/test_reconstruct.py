@@ -29,6 +29,8 @@ from sfm_front.photos.source import list_photos, order_photos
 SUB_FOLDER = "süd flug ✈"
 # Less than is had at full size: what the tests need is a fair run that is quick.
 SMALL = ("--max-image-size", "640", "--max-features", "1500")
+pytestmark = pytest.mark.slow
+
 FAST = (*SMALL, "--candidates", "12", "--global-descriptor", "vlad")
 AUC_AT_5_DEG = 0.85
 

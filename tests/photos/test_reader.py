@@ -37,7 +37,18 @@ looks = pytest.mark.parametrize("look", [PhotoReader().read, file_digest])
 
 
 @looks
-@pytest.mark.parametrize("make", [make_missing, make_folder, make_broken_link, make_pipe])
+@pytest.mark.parametrize(
+    "make",
+    [
+        make_missing,
+        make_folder,
+        make_broken_link,
+        pytest.param(
+            make_pipe,
+            marks=pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no such files"),
+        ),
+    ],
+)
 def test_what_is_no_file_is_unreadable(
     tmp_path: Path, make: Callable[[Path], None], look: Look
 ) -> None:

@@ -15,7 +15,10 @@ from sfm_front.evaluation.retrieval.datasets.oxford import read_queries
 FOLDER = DATA / "ground_truth"
 EXACT = 1e-12
 
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/data")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/data"),
+]
 
 
 @pytest.fixture(scope="module")

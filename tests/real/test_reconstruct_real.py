@@ -18,7 +18,10 @@ FAST = ("--max-image-size", "1000", "--max-features", "2000", "--global-descript
 FOUNTAIN_AUC_AT_5_DEG = 0.85
 DOOR_AUC_AT_5_DEG = 0.95
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data"),
+]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,10 @@ FAST = ("--max-image-size", "800", "--max-features", "1000", "--global-descripto
 BEST_OF_SCENE = 0.98
 """Share of queries whose most relevant photo is of their own scene."""
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not DATA.is_dir(), reason="needs ../shared/data"),
+]
 
 
 @pytest.fixture

@@ -13,7 +13,10 @@ from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
 FOLDER = DATA / "strecha_fountain_P11"
 LEAST_AUC_AT_5_DEG = 0.85  # 0.94 was measured; a wrong frame or pairing of names gives nearly 0
 
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/data")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/data"),
+]
 
 
 @pytest.mark.parametrize("rival", ["exhaustive", "vocabtree"])

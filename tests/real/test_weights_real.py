@@ -19,7 +19,10 @@ from sfm_front.features.global_descriptors.weights import load_weights
 FOLDER = SHARED / "weights"
 RELATIVE_ERROR = 1e-4
 
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/weights")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/weights"),
+]
 
 
 @pytest.fixture(scope="module")

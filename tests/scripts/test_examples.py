@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from helpers.locations import SCRIPTS, VILLAGE
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = SCRIPTS / "examples"
 NAMES = [path.name for path in sorted((VILLAGE / "images").iterdir())[:6]]
 SUMMARY = re.compile(r"registered (\d+) of (\d+).*models: (\d+)")
