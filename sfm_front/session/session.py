@@ -89,7 +89,9 @@ class Session(Closeable):
         verifier = Verifier(self.options.verification)
         matcher = make_matcher(device, self.options.matching, self._workers)
         self._reranker, second_reranker = (
-            Reranker(options, matcher, verifier, self._workers)
+            Reranker(
+                options, matcher, verifier, self._workers, rotation=self.options.matching.rotation
+            )
             for options in (self.options.rerank, self.options.second_rerank)
         )
         guided = GuidedMatcher(
