@@ -1,8 +1,8 @@
 """The options of a session as a TOML file: written with all values, read and checked.
 
 A table of the file is a dataclass of the options, an array of tables a tuple of them. What a file
-leaves out keeps its default. ``threads`` and ``seed`` are set at its top alone: the parts that
-take them from there have no such key.
+leaves out keeps its default. ``max_features``, ``threads`` and ``seed`` are set at its top alone:
+the parts that take them from there have no such key.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _Options = TypeVar("_Options", bound="DataclassInstance")
 
 SET_AT_THE_TOP = {
+    "sift.max_features": "max_features",
     "atlas.mapper.num_threads": "threads",
     "atlas.mapper.seed": "seed",
     "atlas.localization.seed": "seed",

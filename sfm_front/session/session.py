@@ -65,7 +65,10 @@ class Session(Closeable):
         check_output_folder(output, overwrite=overwrite)
         device, on_device = usable_device(self.options.device)
         descriptor, on_descriptor = resolve(
-            self.options.global_descriptor, weights=self.options.weights, device=device
+            self.options.global_descriptor,
+            weights=self.options.weights,
+            vlad_weight=self.options.vlad_weight,
+            device=device,
         )
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         make_output_folder(output, overwrite=overwrite)
@@ -79,7 +82,7 @@ class Session(Closeable):
         output, threads = self.output, self.options.threads
         self._describer = FeatureExtraction(
             PhotoReader(max_image_size=self.options.max_image_size),
-            make_extractor(device, self.options.max_features),
+            make_extractor(device, self.options.sift),
             descriptor,
             num_threads=threads,
         )
