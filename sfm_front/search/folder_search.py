@@ -93,13 +93,7 @@ class FolderSearch:
         self._matching = options.matching
         self._verifier = Verifier(options.verification)
         matcher = make_matcher(device, self._matching, workers)
-        self._reranker = Reranker(
-            self._rerank_options(),
-            matcher,
-            self._verifier,
-            workers,
-            rotation=self._matching.rotation,
-        )
+        self._reranker = Reranker(self._rerank_options(), matcher, self._verifier, workers)
         vectors = workers.map(index.vector, index.photos)
         dimension = len(vectors[0]) if vectors else 0
         self._num_candidates = self._how_many_to_match(len(vectors))
