@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from sfm_front.errors import SfmFrontError
 from sfm_front.features.global_descriptors.codebook import SHIPPED_CODEBOOK
 from sfm_front.features.global_descriptors.codebook_training import train_codebook
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.photos.source import list_photos
 from sfm_front.types import Features, Skipped
@@ -70,7 +70,7 @@ def extract_features(options: argparse.Namespace) -> Iterator[Features]:
     cv2.setNumThreads(1)
     faiss.omp_set_num_threads(1)
     reader = PhotoReader(max_image_size=options.max_image_size)
-    extractor = SiftExtractor(options.max_features)
+    extractor = SiftExtractor(SiftOptions(max_features=options.max_features))
     for folder in options.folders:
         entries = list_photos(folder)
         for number, entry in enumerate(entries, start=1):

@@ -45,7 +45,7 @@ def main() -> None:
     photos = list_photos(parser.parse_args().folder)
     descriptor = GlobalDescriptor(networks=[ColourHistogram()], local=[Vlad()])
     retriever = Retriever(RetrievalOptions(candidates=2, num_expansion=0), descriptor.dimension)
-    reader, sift = PhotoReader(max_image_size=800), make_extractor("cpu", max_features=1000)
+    reader, sift = PhotoReader(max_image_size=800), make_extractor("cpu")
     with FeatureExtraction(reader, sift, descriptor, num_threads=2) as extraction:
         described = [p for p in extraction.stream(photos) if isinstance(p, ExtractedPhoto)]
     for image_id, photo in enumerate(described):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _Options = TypeVar("_Options", bound="DataclassInstance")
 
 TAKEN_FROM = {
+    "sift.max_features": "max_features",
     "atlas.mapper.num_threads": "threads",
     "atlas.mapper.seed": "seed",
     "atlas.mapper.robust.num_threads": "threads",

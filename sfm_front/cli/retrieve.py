@@ -159,13 +159,18 @@ def _describer(options: SessionOptions, location: Path, device: str) -> CachedEx
     from sfm_front.features.global_descriptors.descriptor import resolve
     from sfm_front.photos.reader import PhotoReader
 
-    descriptor, message = resolve(options.global_descriptor, weights=options.weights, device=device)
+    descriptor, message = resolve(
+        options.global_descriptor,
+        weights=options.weights,
+        vlad_weight=options.vlad_weight,
+        device=device,
+    )
     if message:
         _note(message)
     return CachedExtraction(
         location,
         PhotoReader(max_image_size=options.max_image_size),
-        make_extractor(device, options.max_features),
+        make_extractor(device, options.sift),
         {descriptor.name: descriptor},
     )
 

@@ -59,8 +59,7 @@ class CachedExtraction:
         self.settings = ExtractionSettings(
             reader.max_image_size,
             reader.min_image_size,
-            sift.name,
-            sift.max_features,
+            sift.fingerprint,
             tuple(descriptor.fingerprint for descriptor in self._descriptors.values()),
         )
 

@@ -7,7 +7,7 @@ from threading import Lock
 import numpy as np
 import pycolmap
 
-from sfm_front.features.sift import colors_at, enlarged
+from sfm_front.features.sift import SiftOptions, colors_at, enlarged
 from sfm_front.types import Features, Float32Array, Photo
 
 
@@ -16,16 +16,20 @@ class ColmapSift:
 
     name = "colmap-sift"
 
-    def __init__(self, max_features: int = 4000, *, on_gpu: bool = True) -> None:
-        """``max_features``: number of keypoints, largest scale first; COLMAP may return more, since
-        it keeps the last scale level whole."""
-        self.max_features = max_features
-        options = pycolmap.FeatureExtractionOptions()
-        options.use_gpu = on_gpu
-        options.num_threads = 1
-        options.sift.max_num_features = max_features
+    def __init__(self, options: SiftOptions | None = None, *, on_gpu: bool = True) -> None:
+        """Of ``options`` it takes ``max_features`` alone: number of keypoints, largest scale first.
+
+        COLMAP may return more, since it keeps the last scale level whole.
+        """
+        options = options or SiftOptions()
+        self.fingerprint = f"{self.name}:{options.max_features}"
+        """Equal for two extractors only if they find the same features."""
+        of_colmap = pycolmap.FeatureExtractionOptions()
+        of_colmap.use_gpu = on_gpu
+        of_colmap.num_threads = 1
+        of_colmap.sift.max_num_features = options.max_features
         device = pycolmap.Device.cuda if on_gpu else pycolmap.Device.cpu
-        self._extractor = pycolmap.FeatureExtractor.create(options, device)
+        self._extractor = pycolmap.FeatureExtractor.create(of_colmap, device)
         self._lock = Lock()
 
     def extract(self, photo: Photo) -> Features:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 from weakref import WeakSet
 
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.prefetch import prefetch
@@ -39,16 +39,19 @@ class FeatureExtractor(Protocol):
     def extract(self, photo: Photo) -> Features: ...
 
 
-def make_extractor(device: str, max_features: int) -> SiftExtractor | ColmapSift:
-    """SIFT for a device from ``devices.usable_device``: COLMAP's on a GPU if available."""
+def make_extractor(device: str, options: SiftOptions | None = None) -> SiftExtractor | ColmapSift:
+    """SIFT for a device from ``devices.usable_device``: COLMAP's on a GPU if available.
+
+    COLMAP's takes ``max_features`` alone of the options.
+    """
     if device == "cuda":
         import pycolmap
 
         from sfm_front.features.colmap_sift import ColmapSift
 
         if pycolmap.has_cuda:
-            return ColmapSift(max_features)
-    return SiftExtractor(max_features)
+            return ColmapSift(options)
+    return SiftExtractor(options)
 
 
 class FeatureExtraction(Closeable):

@@ -60,13 +60,12 @@ class CacheKeys:
 class ExtractionSettings:
     """Everything that features and vectors depend on besides the photo's bytes.
 
-    ``fingerprints``: the global descriptors'.
+    ``extractor``: fingerprint of the SIFT extractor; ``fingerprints``: the global descriptors'.
     """
 
     max_image_size: int
     min_image_size: int
     extractor: str
-    max_features: int
     fingerprints: tuple[str, ...]
 
     def keys(self, digest: str, box: Box | None = None) -> CacheKeys:
@@ -79,7 +78,6 @@ class ExtractionSettings:
             self.max_image_size,
             self.min_image_size,
             self.extractor,
-            self.max_features,
             digest,
             box,
         )

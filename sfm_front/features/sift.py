@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +11,32 @@ from numpy.typing import NDArray
 from sfm_front.errors import ConfigError
 from sfm_front.types import DESCRIPTOR_NORM, Features, Float32Array, Photo, Uint8Array
 
-# Keypoints described, by response, per keypoint kept, by scale.
-_DESCRIBED_PER_KEPT = 4
-# Smaller photos have few keypoints: COLMAP's lower contrast threshold finds fainter ones. Larger
-# photos have enough (TUNING: small-photo-contrast).
-_SMALL_PHOTO_PX = 1_000_000
-_CONTRAST, _SMALL_PHOTO_CONTRAST = 0.04, 0.02
+
+@dataclass(frozen=True, kw_only=True)
+class SiftOptions:
+    """Which keypoints of a photo are found and kept."""
+
+    # Keypoint locations kept per photo; one with several orientations counts once, as in COLMAP.
+    max_features: int = 4000
+    # Keypoints described, by response, per keypoint kept, by scale.
+    described_per_kept: int = 4
+    # Fewest pixels, at working size, of a photo that has enough keypoints above the higher
+    # contrast threshold (TUNING: small-photo-contrast).
+    large_photo_px: int = 1_000_000
+    # OpenCV's contrast threshold in a large photo; the higher, the fewer faint keypoints.
+    contrast_threshold: float = 0.04
+    # The same in a smaller photo, which has few keypoints: COLMAP's.
+    small_photo_contrast_threshold: float = 0.02
+
+    def __post_init__(self) -> None:
+        for name in ("max_features", "described_per_kept"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if self.large_photo_px < 0:
+            raise ConfigError(f"large_photo_px must not be negative, got {self.large_photo_px}")
+        for name in ("contrast_threshold", "small_photo_contrast_threshold"):
+            if not 0 < getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be above 0 and below 1, got {getattr(self, name)}")
 
 
 class SiftExtractor:
@@ -26,21 +48,25 @@ class SiftExtractor:
 
     name = "opencv-sift"
 
-    def __init__(self, max_features: int = 4000) -> None:
-        """``max_features``: keypoint locations kept per photo; one with several orientations counts
-        once, as in COLMAP. Raises ConfigError if it is below 1.
-        """
-        if max_features < 1:
-            raise ConfigError(f"max_features must be at least 1, got {max_features}")
-        self.max_features = max_features
+    def __init__(self, options: SiftOptions | None = None) -> None:
+        self._options = options or SiftOptions()
+
+    @property
+    def fingerprint(self) -> str:
+        """Equal for two extractors only if they find the same features."""
+        return f"{self.name}:{self._options}"
 
     def extract(self, photo: Photo) -> Features:
         """Keypoints in pixels of the file, largest first; none if there is no texture."""
+        options = self._options
         gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
+        is_large = gray.size >= options.large_photo_px
         # One detector per call: OpenCV does not promise thread safety.
         detector = cv2.SIFT.create(
-            nfeatures=_DESCRIBED_PER_KEPT * self.max_features,
-            contrastThreshold=_SMALL_PHOTO_CONTRAST if gray.size < _SMALL_PHOTO_PX else _CONTRAST,
+            nfeatures=options.described_per_kept * options.max_features,
+            contrastThreshold=options.contrast_threshold
+            if is_large
+            else options.small_photo_contrast_threshold,
             enable_precise_upscale=True,
         )
         found, raw = detector.detectAndCompute(gray, None)
@@ -52,7 +78,7 @@ class SiftExtractor:
             )
         working = np.array([(*k.pt, k.size, k.angle) for k in found], np.float32)
         response = np.array([k.response for k in found], np.float32)
-        kept = _largest(working, response, self.max_features)
+        kept = _largest(working, response, options.max_features)
         working = working[kept]
         return Features(
             _to_file_pixels(working, photo),

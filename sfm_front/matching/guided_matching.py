@@ -1,4 +1,4 @@
-"""Pairs of a photo that was located in a model: matched along epipolar planes."""
+"""Matches a photo whose pose in a model is known along epipolar planes."""
 
 from __future__ import annotations
 
@@ -20,15 +20,19 @@ from sfm_front.types import Float64Array, PairGeometry, RankedCandidate, View
 
 @dataclass(frozen=True, kw_only=True)
 class GuidedOptions:
-    """``max_ratio``: of a match's angle to that of the next best in the band. Stricter than among
-    all features: of 45 pairs of ``strecha_fountain_P11`` 3.6 % of the matches lay more than 60 px
-    from where their neighbours' led with 0.8, and 2.1 % with 0.7, as many as of those matched on
-    all features and verified (2.0 %). ``min_agreeing``: share of the re-ranking's inliers that must
-    agree with the poses.
-    """
+    """When poses are trusted, and which features may match under them."""
 
+    # Largest ratio of the nearest neighbour's angle to the second nearest's in the epipolar band.
+    # Stricter than among all features (TUNING: guided-ratio).
     max_ratio: float = 0.7
+    # Share of the re-ranking inliers that must agree with the poses.
     min_agreeing: float = 0.8
+    # Smallest sine of the angle between a feature's ray and the baseline; 0.05 is about 3 degrees.
+    # Closer to an epipole, epipolar planes cannot be distinguished and there is hardly any
+    # parallax.
+    min_baseline_sine: float = 0.05
+    # How far a match may deviate from the pair's in-plane rotation, in degrees.
+    rotation_tolerance_deg: float = 30.0
 
     def __post_init__(self) -> None:
         if not 0 < self.max_ratio <= 1:
@@ -37,13 +41,22 @@ class GuidedOptions:
             raise ConfigError(
                 f"min_agreeing must be above 0 and at most 1, got {self.min_agreeing}"
             )
+        if not 0 < self.min_baseline_sine < 1:
+            raise ConfigError(
+                f"min_baseline_sine must be above 0 and below 1, got {self.min_baseline_sine}"
+            )
+        if not 0 < self.rotation_tolerance_deg <= 180:
+            raise ConfigError(
+                "rotation_tolerance_deg must be above 0 and at most 180, "
+                f"got {self.rotation_tolerance_deg}"
+            )
 
 
 class GuidedMatcher:
     """Takes the two-view geometry from the poses in the model, and matches accordingly.
 
-    That only holds where the poses are right: the matches that re-ranking found, without knowing
-    of any pose, must agree with them.
+    Poses may be wrong. They are trusted only if they agree with the matches of re-ranking, which
+    were found without them.
     """
 
     def __init__(
@@ -67,7 +80,11 @@ class GuidedMatcher:
         views: Mapping[int, View],
         posed_others: Mapping[int, PosedCamera],
     ) -> list[PairGeometry]:
-        """Pairs of the query, posed so, with those candidates whose poses are known and agree."""
+        """Pairs of the query with those candidates whose poses agree with their matches.
+
+        ``posed``: the query's camera and pose; ``views`` and ``posed_others``: by image id. Without
+        a known pose there is no pair.
+        """
         first = _side(query, posed)
 
         def match_one(candidate: RankedCandidate) -> PairGeometry | None:
@@ -91,12 +108,21 @@ class GuidedMatcher:
             return None
         features1, features2 = first.view.features, second.view.features
         matches = match_masked(
-            features1.descriptors, features2.descriptors, planes.mask(band_rad), self._matching
+            features1.descriptors,
+            features2.descriptors,
+            planes.mask(band_rad, min_sine=self._options.min_baseline_sine),
+            self._matching,
         )
         if candidate.rotation_rad is not None:
             keypoints1 = features1.keypoints[matches[:, 0]]
             keypoints2 = features2.keypoints[matches[:, 1]]
-            matches = matches[agrees_with_rotation(keypoints1, keypoints2, candidate.rotation_rad)]
+            agrees = agrees_with_rotation(
+                keypoints1,
+                keypoints2,
+                candidate.rotation_rad,
+                self._options.rotation_tolerance_deg,
+            )
+            matches = matches[agrees]
         if len(matches) < self._min_inliers:
             return None
         geometry = two_view_geometry(first.posed, second.posed)
@@ -121,7 +147,7 @@ def _side(view: View, posed: PosedCamera) -> _Side:
 
 
 def two_view_geometry(posed1: PosedCamera, posed2: PosedCamera) -> pycolmap.TwoViewGeometry:
-    """As COLMAP has it for calibrated photos: the relative pose with a translation of length 1."""
+    """COLMAP's calibrated two-view geometry: the relative pose with a translation of length 1."""
     geometry = pycolmap.TwoViewGeometry()
     geometry.config = CALIBRATED
     pose = posed1.relative(posed2)

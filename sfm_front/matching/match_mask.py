@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 
 class MaskBlock(NamedTuple):
-    """Rows of the first order against columns of the second; ``meet`` (rows, columns): which of
-    these do, None where all do."""
+    """Rows of the first order against columns of the second.
+
+    ``allowed`` (rows, columns): which of these pairs are compared; None if all are.
+    """
 
     rows: slice
     columns: slice | NDArray[np.intp]
@@ -21,10 +23,11 @@ class MaskBlock(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchMask:
-    """Features in such an order that those to be compared lie in blocks.
+    """Features ordered so that those to be compared form blocks.
 
     ``order1`` (N,): indices of features of the first photo, each at most once. ``order2`` (M',):
-    of the second, where some may come twice. ``blocks`` may be gone through once.
+    of the second, where some may occur twice, but not in one block. ``blocks`` can be iterated
+    only once.
     """
 
     order1: NDArray[np.intp]

@@ -1,4 +1,4 @@
-"""Tentative matches of one photo with several others: on the processor's cores, or on a GPU."""
+"""Tentative matches of one photo with several others, on CPU cores or on a GPU."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Matcher(Protocol):
         """For each other photo (K, 2) uint32: keypoint indices in the query and in the other.
 
         ``rotations_rad``: in-plane rotation of each other photo against the query, so that only
-        features that agree with it are compared; None if it is not known.
+        features that agree with it are compared; None if it is unknown.
         """
         ...
 
@@ -52,7 +52,7 @@ class CpuMatcher:
 
 
 def make_matcher(device: str, options: MatchingOptions, workers: WorkerPool) -> Matcher:
-    """For a device that ``devices.usable_device`` has given."""
+    """The matcher for a device from ``devices.usable_device``."""
     if device == "cpu":
         return CpuMatcher(options, workers)
     from sfm_front.matching.torch_matcher import TorchMatcher

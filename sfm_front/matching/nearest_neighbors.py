@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from sfm_front.errors import ConfigError
-from sfm_front.matching.in_plane_rotation import rotation_mask
+from sfm_front.matching.in_plane_rotation import RotationOptions, rotation_mask
 from sfm_front.matching.match_mask import MaskBlock, MatchMask
 from sfm_front.types import DESCRIPTOR_NORM, Features, Float32Array, Uint8Array, Uint32Array
 
@@ -21,10 +21,12 @@ NO_MATCHES: Uint32Array = np.zeros((0, 2), np.uint32)
 class MatchingOptions:
     """COLMAP's tests on the angle between descriptors, the ratio test in one direction only."""
 
-    # The nearest neighbour's angle over the second nearest's.
+    # Largest ratio of the nearest neighbour's angle to the second nearest's.
     max_ratio: float = 0.8
-    # The largest angle of a match.
+    # Largest angle between the descriptors of a match, in radians.
     max_angle_rad: float = 0.7
+    # Which features are compared if the photos' in-plane rotation is known.
+    rotation: RotationOptions = field(default_factory=RotationOptions)
 
     def __post_init__(self) -> None:
         if not 0 < self.max_ratio <= 1:
@@ -39,8 +41,8 @@ def match_descriptors(
     """RootSIFT (N, 128) and (M, 128) uint8 → mutual nearest neighbours (K, 2) uint32.
 
     A row holds the indices in the first and in the second set, sorted by the first; no index
-    occurs twice. Exact: the similarities are integers that float32 represents. One matrix product
-    serves both directions, in blocks of rows that fit the CPU cache.
+    occurs twice. Exact: the similarities are integers that float32 can represent. One matrix
+    product serves both directions, in blocks of rows that fit the CPU cache.
     """
     count1, count2 = len(descriptors1), len(descriptors2)
     blocks = [
@@ -56,11 +58,13 @@ def match_rotated(
 ) -> Uint32Array:
     """Like ``match_descriptors``, between features that agree with the in-plane rotation only.
 
-    Faster, and with more inliers: a feature's second nearest neighbour is not searched where no
-    match can be (TUNING: rotation-matching).
+    Faster, and with more inliers: features that cannot match do not count as second nearest
+    neighbours either (TUNING: rotation-matching).
     """
-    alike = rotation_mask(features1.keypoints[:, 3], features2.keypoints[:, 3], rotation_rad)
-    return match_masked(features1.descriptors, features2.descriptors, alike, options)
+    mask = rotation_mask(
+        features1.keypoints[:, 3], features2.keypoints[:, 3], rotation_rad, options.rotation
+    )
+    return match_masked(features1.descriptors, features2.descriptors, mask, options)
 
 
 def match_masked(
@@ -97,7 +101,7 @@ def match_masked(
         & (angle < options.max_ratio * _angle(runner_up))
         & (best == best_of_second[nearest])
     )
-    # Equal descriptors in the first photo share their nearest neighbour: the first one gets it.
+    # Equal descriptors in the first photo have the same nearest neighbour: the first one gets it.
     found = mask.order1[kept]
     order = np.argsort(found)
     targets, once = np.unique(nearest[kept][order], return_index=True)

@@ -1,4 +1,4 @@
-"""Matching of a photo with all its candidates in one batch, by torch: for GPUs."""
+"""Matches a photo with all its candidates in one batch with torch, for GPUs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sfm_front.matching.in_plane_rotation import NUM_SECTORS, TOLERANCE_RAD
 from sfm_front.matching.nearest_neighbors import NO_MATCHES, SQUARED_NORM, MatchingOptions
 from sfm_front.types import Features, Uint32Array
 
@@ -17,14 +16,13 @@ if TYPE_CHECKING:
 
 # Similarities held at once: 2 GiB of float32.
 _MAX_SIMILARITIES = 2**29
-_SECTOR_RAD = 2 * math.pi / NUM_SECTORS
 
 
 class TorchMatcher:
-    """Finds what ``match_descriptors`` and ``match_rotated`` find.
+    """Finds the matches that ``match_descriptors`` and ``match_rotated`` find.
 
-    Similarities are whole numbers below 2^24, which float32 products give exactly; torch leaves
-    TensorFloat-32, which would not, off for matrix products unless told otherwise.
+    Similarities are integers below 2^24, which float32 products give exactly. TensorFloat-32 would
+    not; torch leaves it off for matrix products by default.
     """
 
     def __init__(self, options: MatchingOptions, device: str) -> None:
@@ -73,7 +71,7 @@ class TorchMatcher:
     def _similarities(
         self, query: Features, others: Sequence[Features], rotations_rad: Sequence[float | None]
     ) -> torch.Tensor:
-        """(pairs, N, M) float32; -1 where two features do not meet, or there is none."""
+        """(pairs, N, M) float32; -1 where two features must not match or one does not exist."""
         import torch
 
         width = max(2, *(len(other) for other in others))
@@ -86,20 +84,22 @@ class TorchMatcher:
         similarity.masked_fill_(~exists, -1)
         for pair, rotation_rad in enumerate(rotations_rad):
             if rotation_rad is not None and len(others[pair]) > 0:
-                meets = self._meets(query, others[pair], rotation_rad)
-                similarity[pair, :, : len(others[pair])].masked_fill_(~meets, -1)
+                allowed = self._allowed(query, others[pair], rotation_rad)
+                similarity[pair, :, : len(others[pair])].masked_fill_(~allowed, -1)
         return similarity
 
-    def _meets(self, query: Features, other: Features, rotation_rad: float) -> torch.Tensor:
-        """(N, M) bool: as ``orientation.rotation_mask`` has it."""
+    def _allowed(self, query: Features, other: Features, rotation_rad: float) -> torch.Tensor:
+        """(N, M) bool: the pairs that ``rotation_mask`` allows."""
         import torch
 
+        rotation = self._options.rotation
+        sector_rad = 2 * math.pi / rotation.num_sectors
         expected = torch.remainder(self._send(query.keypoints[:, 3]) + rotation_rad, 2 * math.pi)
-        middle = (torch.floor(expected / _SECTOR_RAD) + 0.5) * _SECTOR_RAD
+        middle = (torch.floor(expected / sector_rad) + 0.5) * sector_rad
         apart = middle[:, None] - self._send(other.keypoints[:, 3])[None]
         apart = torch.remainder(apart + math.pi, 2 * math.pi) - math.pi
-        meets: torch.Tensor = apart.abs() <= _SECTOR_RAD / 2 + TOLERANCE_RAD
-        return meets
+        allowed: torch.Tensor = apart.abs() <= sector_rad / 2 + rotation.tolerance_rad
+        return allowed
 
     def _send(self, array: np.ndarray) -> torch.Tensor:
         import torch
@@ -112,7 +112,7 @@ def _angle(similarity: torch.Tensor) -> torch.Tensor:
 
 
 def _first_of_each(kept: np.ndarray, nearest: np.ndarray) -> Uint32Array:
-    """Rows (query, other) of what is kept; of equals in the query, the first one."""
+    """(K, 2) kept matches; of query features with the same nearest neighbour, the first one."""
     rows = np.flatnonzero(kept)
     _, once = np.unique(nearest[rows], return_index=True)
     rows = rows[np.sort(once)]

@@ -1,4 +1,4 @@
-"""Tentative matches → PairGeometry, or the reason why not."""
+"""Tentative matches → PairGeometry, or the reason for rejection."""
 
 from __future__ import annotations
 
@@ -26,23 +26,27 @@ CALIBRATED = int(pycolmap.TwoViewGeometryConfiguration.CALIBRATED)
 
 @dataclass(frozen=True, kw_only=True)
 class VerificationOptions:
-    """When two photos count as overlapping.
+    """When two photos count as overlapping."""
 
-    ``max_error_px``: epipolar error of an inlier, in pixels of the file.
-    ``min_inliers``: fewest inliers of a two-view geometry.
-    ``max_gate_trials``: samples of the fundamental-matrix gate.
-    ``model_sample``: inliers on which the two-view model is estimated; all are then counted.
-    ``seed``: of the model's samples; the gate draws the same samples always.
-    """
-
+    # Largest epipolar error of an inlier, in pixels of the file.
     max_error_px: float = 4.0
+    # Fewest inliers of a two-view geometry.
     min_inliers: int = 15
+    # Most RANSAC trials of the gate, a fundamental matrix.
     max_gate_trials: int = 2000
+    # Probability that one of the gate's trials is free of outliers; it ends once that is reached.
+    gate_confidence: float = 0.999
+    # Number of gate inliers that the two-view model is estimated from; all matches are then
+    # tested on it.
     model_sample: int = 300
+    # Fewest RANSAC trials of the two-view model. The gate leaves hardly any outliers: COLMAP's 100
+    # trials would mostly repeat each other.
+    min_model_trials: int = 30
+    # Of the model's samples; the gate always draws the same samples.
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.max_error_px <= 0:
+        if not self.max_error_px > 0:
             raise ConfigError(f"max_error_px must be above 0, got {self.max_error_px}")
         if self.min_inliers < 8:
             raise ConfigError(f"min_inliers must be at least 8, got {self.min_inliers}")
@@ -51,10 +55,21 @@ class VerificationOptions:
                 f"model_sample must be at least min_inliers ({self.min_inliers}), "
                 f"got {self.model_sample}"
             )
+        if self.max_gate_trials < 1:
+            raise ConfigError(f"max_gate_trials must be at least 1, got {self.max_gate_trials}")
+        if not 0 < self.gate_confidence < 1:
+            raise ConfigError(
+                f"gate_confidence must be above 0 and below 1, got {self.gate_confidence}"
+            )
+        most = pycolmap.TwoViewGeometryOptions().ransac.max_num_trials
+        if not 1 <= self.min_model_trials <= most:
+            raise ConfigError(
+                f"min_model_trials must be from 1 to {most}, got {self.min_model_trials}"
+            )
 
 
 class Verifier:
-    """Estimates two-view geometry. The same input gives the same output; threads may share it."""
+    """Estimates two-view geometry. Deterministic and thread-safe."""
 
     def __init__(self, options: VerificationOptions | None = None) -> None:
         self.options = options or VerificationOptions()
@@ -64,11 +79,10 @@ class Verifier:
         ransac = self._model_options.ransac
         ransac.max_error = self.options.max_error_px
         ransac.random_seed = self.options.seed
-        # The gate leaves hardly an outlier: COLMAP's 100 trials would mostly repeat themselves.
-        ransac.min_num_trials = 30
+        ransac.min_num_trials = self.options.min_model_trials
 
     def inliers(self, view1: View, view2: View, matches: Uint32Array) -> Uint32Array:
-        """(K, 2) matches that survive RANSAC on a fundamental matrix; none where there is none."""
+        """(K, 2) inliers of a fundamental matrix, by RANSAC; none if no matrix is found."""
         return matches[self._gate(view1, view2, matches)]
 
     def count_inliers(self, view1: View, view2: View, matches: Uint32Array) -> int:
@@ -78,9 +92,9 @@ class Verifier:
     def verify(self, view1: View, view2: View, matches: Uint32Array) -> PairGeometry | Rejected:
         """Two-view geometry of two photos from their tentative matches (M, 2).
 
-        A fundamental matrix (OpenCV's USAC) gates first: where nothing matches it takes
-        milliseconds, COLMAP's calibrated estimate up to a second. The calibrated estimate then
-        sees a sample of the survivors, and its essential matrix is tested on every match.
+        A fundamental matrix (OpenCV's USAC) is the gate: without overlap it takes milliseconds,
+        COLMAP's calibrated estimate up to a second. The calibrated estimate then sees a sample of
+        the gate's inliers, and its essential matrix is tested on every match.
         """
         options = self.options
 
@@ -106,7 +120,7 @@ class Verifier:
         return PairGeometry(view1.image_id, view2.image_id, matches, geometry)
 
     def _gate(self, view1: View, view2: View, matches: Uint32Array) -> NDArray[np.bool_]:
-        """(M,) inliers of the best fundamental matrix; all False where there is none."""
+        """(M,) inliers of the best fundamental matrix; all False if none is found."""
         nothing = np.zeros(len(matches), np.bool_)
         if len(matches) < 8:
             return nothing
@@ -116,11 +130,11 @@ class Verifier:
                 view2.points(matches[:, 1]),
                 cv2.USAC_ACCURATE,
                 self.options.max_error_px,
-                0.999,
+                self.options.gate_confidence,
                 self.options.max_gate_trials,
             )
         except cv2.error:
-            # OpenCV 5.0 asserts inside USAC where no sample gave a model, instead of saying so.
+            # OpenCV 5.0 fails an assertion inside USAC if no sample gave a model.
             return nothing
         return nothing if mask is None else mask.ravel().astype(np.bool_)
 
@@ -144,7 +158,7 @@ class Verifier:
     def _essential_inliers(
         self, essential: Float64Array, view1: View, view2: View, matches: Uint32Array
     ) -> NDArray[np.bool_]:
-        """(M,) matches whose Sampson error under x2ᵀ E x1 = 0 is within max_error_px."""
+        """(M,) whether each match's Sampson error under x2ᵀ E x1 = 0 is at most max_error_px."""
         rays1 = undistorted_rays(view1.camera, view1.points(matches[:, 0]))
         rays2 = undistorted_rays(view2.camera, view2.points(matches[:, 1]))
         lines2 = rays1 @ essential.T
@@ -153,6 +167,6 @@ class Verifier:
         gradient = (lines1[:, :2] ** 2).sum(axis=1) + (lines2[:, :2] ** 2).sum(axis=1)
         focal_px = 0.5 * (view1.camera.mean_focal_length() + view2.camera.mean_focal_length())
         max_error = self.options.max_error_px / focal_px
-        # Written so that a ray that cannot be undistorted (nan) counts as an outlier.
+        # As a comparison that is False for nan: rays that cannot be undistorted are outliers.
         inside: NDArray[np.bool_] = algebraic**2 <= max_error**2 * gradient
         return inside

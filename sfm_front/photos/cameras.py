@@ -21,14 +21,6 @@ AnyPhoto: TypeAlias = "Photo | ExtractedPhoto | StoredPhoto"
 DEFAULT_FOCAL_FACTOR = 1.2
 """Focal length over the long side if EXIF gives none, as in COLMAP."""
 
-PLAUSIBLE_FOCAL_FACTORS = (0.1, 10.0)
-"""EXIF focal lengths outside this range, in long sides, are ignored."""
-
-PHOTOS_PER_SIZE = 10
-"""Photos without EXIF share cameras while their folder has at most one size, plus one per this many
-photos. Film frames, phones and benchmarks have one size per folder; internet photos have nearly as
-many sizes as photos, and equal sizes only by chance (TUNING: photos-per-size)."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class CameraOptions:
@@ -36,7 +28,7 @@ class CameraOptions:
 
     # Which photos share one camera.
     #   auto: those of the same make, model, focal length and size; those without EXIF by folder
-    #   and size (see PHOTOS_PER_SIZE).
+    #   and size (see photos_per_size).
     #   single: all. per-folder: those of a folder. per-image: none.
     # In every mode photos of different size have different cameras: COLMAP would reject them in the
     # modes single and per-folder; here no photo is lost. Portrait and landscape differ in size.
@@ -46,6 +38,15 @@ class CameraOptions:
     # Known calibration, in COLMAP's order and in pixels of the file. It applies to the first photo
     # and all of its size; photos of other sizes start from their own focal length.
     params: tuple[float, ...] | None = None
+    # Photos without EXIF share cameras while their folder has at most one size, plus one per this
+    # many photos. Film frames, phones and benchmarks have one size per folder; photos from the
+    # internet have nearly as many sizes as photos, and equal ones by chance
+    # (TUNING: photos-per-size).
+    photos_per_size: int = 10
+    # Smallest plausible focal length over the long side; an EXIF focal length below it is ignored.
+    min_focal_factor: float = 0.1
+    # The largest one; an EXIF focal length above it is ignored.
+    max_focal_factor: float = 10.0
 
     def __post_init__(self) -> None:
         import pycolmap
@@ -56,6 +57,15 @@ class CameraOptions:
         models = [name for name in pycolmap.CameraModelId.__members__ if name != "INVALID"]
         if self.model not in models:
             raise ConfigError(f"camera model must be one of {', '.join(models)}, got {self.model}")
+        if self.photos_per_size < 1:
+            raise ConfigError(f"photos_per_size must be at least 1, got {self.photos_per_size}")
+        if not self.min_focal_factor > 0:
+            raise ConfigError(f"min_focal_factor must be above 0, got {self.min_focal_factor}")
+        if not self.max_focal_factor > self.min_focal_factor:
+            raise ConfigError(
+                f"max_focal_factor must be above min_focal_factor ({self.min_focal_factor}), "
+                f"got {self.max_focal_factor}"
+            )
         if self.params is None:
             return
         expected = pycolmap.Camera.create_from_model_name(1, self.model, 1.0, 1, 1)
@@ -144,14 +154,14 @@ class CameraCatalog:
         seen = self._folders.setdefault(folder, _Folder())
         seen.num_photos += 1
         seen.sizes.add((min(size), max(size)))
-        if len(seen.sizes) <= 1 + seen.num_photos // PHOTOS_PER_SIZE:
+        if len(seen.sizes) <= 1 + seen.num_photos // self._options.photos_per_size:
             return ("folder", folder, size)
         return ("photo", photo.name)
 
     def _new_camera(self, photo: AnyPhoto) -> pycolmap.Camera:
         import pycolmap
 
-        prior = focal_prior_px(photo)
+        prior = focal_prior_px(photo, self._options)
         camera = pycolmap.Camera.create_from_model_name(
             self._last_id + 1,
             self._options.model,
@@ -168,7 +178,7 @@ class CameraCatalog:
         return camera
 
 
-def focal_prior_px(photo: AnyPhoto) -> float | None:
+def focal_prior_px(photo: AnyPhoto, options: CameraOptions) -> float | None:
     """The focal length in pixels according to EXIF; None if absent or implausible.
 
     From the 35 mm equivalent, by diagonals as in COLMAP; else from the focal length and the sensor
@@ -181,10 +191,10 @@ def focal_prior_px(photo: AnyPhoto) -> float | None:
         focal_px = exif.focal_length_35mm / FULL_FRAME_DIAGONAL_MM * diagonal_px
     elif exif.focal_length_mm is not None and exif.make and exif.model:
         focal_px = _focal_from_camera_database(photo)
-    smallest, largest = PLAUSIBLE_FOCAL_FACTORS
-    if focal_px is None or not smallest <= focal_px / max(photo.width, photo.height) <= largest:
+    if focal_px is None:
         return None
-    return focal_px
+    factor = focal_px / max(photo.width, photo.height)
+    return focal_px if options.min_focal_factor <= factor <= options.max_focal_factor else None
 
 
 def _focal_from_camera_database(photo: AnyPhoto) -> float | None:

@@ -12,34 +12,46 @@ retrieval", ICCV 2007.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import faiss
 import numpy as np
 from numpy.typing import NDArray
 
+from sfm_front.errors import ConfigError
 from sfm_front.types import Candidate, Float32Array, Uint8Array
-
-SHORTLIST = 192
-"""Photos whose vectors are compared; four times those requested if that is more. More cost time and
-hardly find more (TUNING: shortlist)."""
-
-# Photos re-ordered by an expanded query. The whole shortlist takes longer and gives the same
-# (TUNING: expansion-depth).
-_EXPANDED = 100
 
 # A vector is rotated as a matrix with this many columns; the result has this many rows.
 _COLUMNS = 128
 _CODE_ROWS = 128
 
 
+@dataclass(frozen=True, kw_only=True)
+class IndexOptions:
+    """How many photos a query compares at each step."""
+
+    # Photos of nearest codes whose vectors are compared; four times those requested if that is
+    # more. More take longer and hardly find more (TUNING: shortlist).
+    shortlist: int = 192
+    # Photos that an expanded query re-orders; twice those requested if that is more. The whole
+    # shortlist takes longer and gives the same (TUNING: expansion-depth).
+    expansion_depth: int = 100
+
+    def __post_init__(self) -> None:
+        for name in ("shortlist", "expansion_depth"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
+
+
 class CosineIndex:
     """Unit vectors of photos, compared by cosine. Adding is amortised constant time.
 
-    Exhaustive up to ``SHORTLIST`` photos, approximate beyond. Cosines are accurate to 0.001.
-    A photo takes one byte per number plus 2 kB: 18 kB with VLAD of 16 384 numbers.
+    Exhaustive up to ``IndexOptions.shortlist`` photos, approximate beyond. Cosines are accurate to
+    0.001. A photo takes one byte per number plus 2 kB: 18 kB with VLAD of 16 384 numbers.
     """
 
-    def __init__(self, dimension: int) -> None:
+    def __init__(self, dimension: int, options: IndexOptions | None = None) -> None:
+        self._options = options or IndexOptions()
         # An empty folder's vectors have dimension 0, which faiss does not accept.
         dimension = max(1, dimension)
         self._encoder = _SignEncoder(dimension)
@@ -77,15 +89,15 @@ class CosineIndex:
         ties by order of arrival.
 
         ``num_expansion``: number of top results that are added to the vector, each weighted by its
-        cosine; ``expand_with``: photos added likewise. The expanded vector orders the best 100,
-        or ``2 * count`` if that is more; reported cosines remain those with the original vector.
+        cosine; ``expand_with``: photos added likewise. The expanded vector orders the best
+        ``IndexOptions.expansion_depth``; reported cosines remain those with the original vector.
         """
-        rows = self._shortlist(vector, max(SHORTLIST, 4 * count))
+        rows = self._shortlist(vector, max(self._options.shortlist, 4 * count))
         cosines = scores = self._cosines(vector, rows)
         best = (int(rows[i]) for i in _best(cosines, num_expansion))
         companions = {*best, *(self._rows[image_id] for image_id in expand_with)}
         if companions:
-            near = np.sort(_best(cosines, max(_EXPANDED, 2 * count)))
+            near = np.sort(_best(cosines, max(self._options.expansion_depth, 2 * count)))
             rows, cosines = rows[near], cosines[near]
             scores = self._cosines(self._expanded(vector, sorted(companions)), rows)
         return [

@@ -9,10 +9,10 @@ feature model for object retrieval", ICCV 2007.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sfm_front.errors import ConfigError
-from sfm_front.retrieval.index import CosineIndex
+from sfm_front.retrieval.index import CosineIndex, IndexOptions
 from sfm_front.types import Candidate, Float32Array, RankedCandidate
 
 
@@ -24,6 +24,8 @@ class RetrievalOptions:
     candidates: int = 25
     # Number of top results used for query expansion (TUNING: query-expansion).
     num_expansion: int = 5
+    # How many photos the index compares.
+    index: IndexOptions = field(default_factory=IndexOptions)
 
     def __post_init__(self) -> None:
         if self.candidates < 1:
@@ -37,7 +39,7 @@ class Retriever:
 
     def __init__(self, options: RetrievalOptions, dimension: int) -> None:
         self._options = options
-        self._index = CosineIndex(dimension)
+        self._index = CosineIndex(dimension, options.index)
 
     def __len__(self) -> int:
         return len(self._index)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sfm_front.errors import ConfigError
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.global_descriptors.descriptor import AUTO, VLAD_WEIGHT, check_vlad_weight
+from sfm_front.features.sift import SiftOptions
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.matching.guided_matching import GuidedOptions
 from sfm_front.matching.nearest_neighbors import MatchingOptions
@@ -40,36 +41,52 @@ def _default_cache_bytes() -> int:
 class SessionOptions:
     """How photos are described, retrieved, matched and mapped.
 
-    ``max_image_size``: long side in pixels that photos are reduced to. ``max_features``: SIFT
-    keypoints a photo. ``global_descriptor``: a name that ``features.global_descriptor.resolve``
-    knows; ``weights``: a file for its network; ``device``: ``auto``, ``cpu`` or
-    ``cuda``, of the network and of matching. ``rerank``: the look that ranks candidates;
-    ``second_rerank``: at those of which it told too little.
-    ``pair_matching``: the candidates that are matched on all features.
-    ``threads``: cores to use. ``seed``: of all RANSAC. Both reach every part from here.
-    ``text``: write models in COLMAP's text form too. ``snapshot_seconds``: how old the models in
-    ``sparse/`` may be while photos arrive; ``cache_mb``: memory for features of earlier photos,
-    None: a quarter of the machine's, 2 GiB at most; others are read again from the database.
+    ``max_features``, ``threads`` and ``seed`` reach every part from here: what a part is given for
+    them is replaced.
     """
 
+    # Long side that photos are reduced to, in pixels.
     max_image_size: int = 1600
-    max_features: int = 4000
-    global_descriptor: str = "auto"
+    # SIFT keypoints per photo.
+    max_features: int = SiftOptions.max_features
+    # A name that ``global_descriptors.descriptor.resolve`` knows.
+    global_descriptor: str = AUTO
+    # A file for its network, instead of the official one.
     weights: Path | None = None
+    # Weight of VLAD's cosine if it is joined with one network (TUNING: vlad-weight).
+    vlad_weight: float = VLAD_WEIGHT
+    # Of the network and of matching: auto, cpu or cuda.
     device: str = "auto"
+    # Whether to write models in COLMAP's text form too.
     text: bool = False
+    # How old the models in ``sparse/`` may be while photos arrive.
     snapshot_seconds: float = 30.0
+    # Memory for features of earlier photos, in MiB; others are read again from the database.
+    # None: a quarter of the machine's, 2 GiB at most.
     cache_mb: int | None = None
+    # Cores to use.
     threads: int = field(default_factory=available_cores)
+    # Of all RANSAC.
     seed: int = 0
+    # Which photos share a camera.
     cameras: CameraOptions = field(default_factory=CameraOptions)
+    # Which keypoints are found and kept. COLMAP's SIFT, on CUDA, takes max_features alone.
+    sift: SiftOptions = field(default_factory=SiftOptions)
+    # Which candidates the global vectors propose.
     retrieval: RetrievalOptions = field(default_factory=RetrievalOptions)
+    # How the candidates are ranked.
     rerank: RerankOptions = field(default_factory=RerankOptions)
+    # How those without a known in-plane rotation are ranked a second time.
     second_rerank: RerankOptions = field(default_factory=lambda: RerankOptions(max_features=2000))
+    # Which candidates are matched on all features.
     pair_matching: PairMatchingOptions = field(default_factory=PairMatchingOptions)
+    # Which features of two photos match.
     matching: MatchingOptions = field(default_factory=MatchingOptions)
+    # The same if the poses of both photos are known.
     guided: GuidedOptions = field(default_factory=GuidedOptions)
+    # Which pairs of photos are accepted.
     verification: VerificationOptions = field(default_factory=VerificationOptions)
+    # How the models grow.
     atlas: AtlasOptions = field(default_factory=AtlasOptions)
 
     def __post_init__(self) -> None:
@@ -84,9 +101,10 @@ class SessionOptions:
         atlas = replace(self.atlas, mapper=mapper, localization=localization)
         object.__setattr__(self, "atlas", atlas)
         object.__setattr__(self, "verification", replace(self.verification, seed=self.seed))
-        # These check themselves: here, so that it is done before a session has written anything.
+        object.__setattr__(self, "sift", replace(self.sift, max_features=self.max_features))
+        # Checked here, so that it is done before a session has written anything.
+        check_vlad_weight(self.vlad_weight)
         PhotoReader(max_image_size=self.max_image_size)
-        SiftExtractor(self.max_features)
 
     @property
     def cache_bytes(self) -> int:

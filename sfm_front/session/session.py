@@ -106,7 +106,10 @@ class Session(Closeable):
         check_output_folder(output, overwrite=overwrite, resume=resume)
         device, on_device = usable_device(self.options.device)
         descriptor, on_descriptor = resolve(
-            self.options.global_descriptor, weights=self.options.weights, device=device
+            self.options.global_descriptor,
+            weights=self.options.weights,
+            vlad_weight=self.options.vlad_weight,
+            device=device,
         )
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         self._finished = False
@@ -123,7 +126,7 @@ class Session(Closeable):
         threads = self.options.threads
         self._extraction = FeatureExtraction(
             PhotoReader(max_image_size=self.options.max_image_size),
-            make_extractor(device, self.options.max_features),
+            make_extractor(device, self.options.sift),
             descriptor,
             num_threads=threads,
         )
@@ -133,7 +136,9 @@ class Session(Closeable):
         verifier = Verifier(self.options.verification)
         matcher = make_matcher(device, self.options.matching, self._workers)
         self._reranker, second_reranker = (
-            Reranker(options, matcher, verifier, self._workers)
+            Reranker(
+                options, matcher, verifier, self._workers, rotation=self.options.matching.rotation
+            )
             for options in (self.options.rerank, self.options.second_rerank)
         )
         guided = GuidedMatcher(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -14,14 +14,15 @@ from PIL import Image
 from sfm_front.features import feature_cache as description_files
 from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto, crop
 from sfm_front.features.feature_cache import CachedFeatures, FeatureCache
-from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
+from sfm_front.features.global_descriptors.descriptor import VLAD_WEIGHT, GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.types import Exif, GeoPosition, PhotoPath, Skipped, SkipReason
 
 SUBPIXEL_PX = 0.6
 VECTOR_TOLERANCE = 1e-6  # float32
+SIFT = SiftOptions(max_features=300)
 
 
 class MeanColor:
@@ -50,10 +51,16 @@ class CountingSift(SiftExtractor):
 
 class Setup:
     def __init__(
-        self, folder: Path, *, max_features: int = 300, size: int = 1600, fingerprint: str = "mean"
+        self,
+        folder: Path,
+        *,
+        sift: SiftOptions = SIFT,
+        size: int = 1600,
+        fingerprint: str = "mean",
+        vlad_weight: float = VLAD_WEIGHT,
     ) -> None:
         self.network = MeanColor(fingerprint)
-        self.sift = CountingSift(max_features)
+        self.sift = CountingSift(sift)
         self.describer = CachedExtraction(
             folder / "cache",
             PhotoReader(max_image_size=size),
@@ -61,6 +68,9 @@ class Setup:
             {
                 "mean": GlobalDescriptor(networks=[self.network]),
                 "vlad": GlobalDescriptor(local=[Vlad()]),
+                "joined": GlobalDescriptor(
+                    networks=[self.network], local=[Vlad()], vlad_weight=vlad_weight
+                ),
             },
         )
 
@@ -84,7 +94,7 @@ def test_a_photo_is_described_as_by_its_parts(tmp_path, photo):
     setup = Setup(tmp_path)
     recalled = setup.describer.describe(photo)
     read = PhotoReader().read(photo.path, photo.name)
-    features = SiftExtractor(300).extract(read)
+    features = SiftExtractor(SIFT).extract(read)
     np.testing.assert_array_equal(recalled.photo.features.keypoints, features.keypoints)
     vlad, mean = recalled.vectors["vlad"], recalled.vectors["mean"]
     np.testing.assert_allclose(vlad, Vlad().describe(features), atol=VECTOR_TOLERANCE)
@@ -113,19 +123,48 @@ def test_the_bytes_count_and_not_the_name(tmp_path, photo):
     assert later.sift.calls == 1
 
 
-@pytest.mark.parametrize("other", [{"max_features": 200}, {"size": 200}])
+CHANGED_SIFT = [
+    replace(SIFT, max_features=200),
+    replace(SIFT, described_per_kept=3),
+    replace(SIFT, large_photo_px=50_000),
+    replace(SIFT, contrast_threshold=0.03),
+    replace(SIFT, small_photo_contrast_threshold=0.03),
+]
+
+
+@pytest.mark.parametrize("other", [{"size": 200}, *({"sift": sift} for sift in CHANGED_SIFT)])
 def test_other_settings_have_other_features(tmp_path, photo, other):
     Setup(tmp_path).describer.describe(photo)
     later = Setup(tmp_path, **other)
     later.describer.describe(photo)
-    assert (later.network.calls, later.sift.calls) == (1, 1)
+    assert (later.network.calls, later.sift.calls) == (2, 1)
+
+
+def test_every_option_of_sift_is_among_those_settings():
+    changed = {
+        field.name
+        for sift in CHANGED_SIFT
+        for field in fields(SiftOptions)
+        if getattr(sift, field.name) != getattr(SIFT, field.name)
+    }
+    assert changed == {field.name for field in fields(SiftOptions)}
+
+
+def test_another_weight_has_another_joined_vector_and_the_same_parts(tmp_path, photo):
+    first = Setup(tmp_path).describer.describe(photo)
+    later = Setup(tmp_path, vlad_weight=0.5)
+    second = later.describer.describe(photo)
+    assert (later.network.calls, later.sift.calls) == (1, 0)
+    for name in first.vectors:
+        differs = not np.array_equal(first.vectors[name], second.vectors[name])
+        assert differs == (name == "joined")
 
 
 def test_another_network_leaves_features_as_they_are(tmp_path, photo):
     Setup(tmp_path).describer.describe(photo)
     later = Setup(tmp_path, fingerprint="trained longer")
     later.describer.describe(photo)
-    assert (later.network.calls, later.sift.calls) == (1, 0)
+    assert (later.network.calls, later.sift.calls) == (2, 0)
 
 
 def test_photos_described_by_other_code_are_described_again(tmp_path, photo, monkeypatch):
@@ -133,7 +172,7 @@ def test_photos_described_by_other_code_are_described_again(tmp_path, photo, mon
     monkeypatch.setattr(description_files, "_code_digest", lambda: "changed")
     later = Setup(tmp_path)
     later.describer.describe(photo)
-    assert (later.network.calls, later.sift.calls) == (1, 1)
+    assert (later.network.calls, later.sift.calls) == (2, 1)
 
 
 @pytest.mark.parametrize("kind", ["features", "vectors"])

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from sfm_front.features.colmap_sift import ColmapSift
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors
 from sfm_front.types import Features, Photo
 
@@ -61,8 +61,15 @@ def test_keypoints_of_a_reduced_photo_are_in_pixels_of_the_file(features, textur
 
 
 def test_a_cap_leaves_the_largest_and_blank_photos_have_none(features, texture):
-    few = ColmapSift(50, on_gpu=False).extract(photo_of(texture))
+    few = ColmapSift(SiftOptions(max_features=50), on_gpu=False).extract(photo_of(texture))
     assert 50 <= len(few) < len(features) / 2
     np.testing.assert_array_equal(few.keypoints[:50], features.keypoints[:50])
     blank = np.full((80, 100, 3), 128, np.uint8)
     assert len(ColmapSift(on_gpu=False).extract(photo_of(blank))) == 0
+
+
+def test_its_fingerprint_tells_what_changes_its_features():
+    default = ColmapSift(on_gpu=False).fingerprint
+    assert ColmapSift(SiftOptions(max_features=50), on_gpu=False).fingerprint != default
+    assert ColmapSift(SiftOptions(contrast_threshold=0.1), on_gpu=False).fingerprint == default
+    assert SiftExtractor().fingerprint != default

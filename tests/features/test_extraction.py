@@ -15,7 +15,7 @@ from PIL import Image
 from sfm_front.features.extraction import FeatureExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.types import ExtractedPhoto, PhotoPath, Skipped, SkipReason
 
@@ -61,7 +61,7 @@ def describer(num_threads: int, network: MeanColour | None = None) -> FeatureExt
     networks = [] if network is None else [network]
     return FeatureExtraction(
         PhotoReader(),
-        SiftExtractor(200),
+        SiftExtractor(SiftOptions(max_features=200)),
         GlobalDescriptor(networks=networks, local=[Vlad()]),
         num_threads=num_threads,
     )
@@ -102,7 +102,7 @@ def test_a_photo_is_what_its_parts_say(photos):
     photo = PhotoReader().read(photos[0].path, photos[0].name)
     assert (result.path, result.width, result.height) == (photos[0].path, 208, 160)
     assert result.digest == photo.digest
-    features = SiftExtractor(200).extract(photo)
+    features = SiftExtractor(SiftOptions(max_features=200)).extract(photo)
     np.testing.assert_array_equal(result.features.keypoints, features.keypoints)
     np.testing.assert_array_equal(result.features.descriptors, features.descriptors)
     expected = GlobalDescriptor(local=[Vlad()]).describe(photo.pixels, features)

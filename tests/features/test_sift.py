@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from sfm_front.errors import ConfigError
-from sfm_front.features.sift import SiftExtractor, root_sift
+from sfm_front.features.sift import SiftExtractor, SiftOptions, root_sift
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.types import Features, Photo
 
@@ -157,9 +157,9 @@ def test_an_empty_descriptor_stays_empty():
 
 def test_the_largest_come_first_and_are_kept():
     photo = photo_of(texture())
-    every = SiftExtractor(100_000).extract(photo)
+    every = SiftExtractor(SiftOptions(max_features=100_000)).extract(photo)
     count = len(every) // 3
-    few = SiftExtractor(count).extract(photo)
+    few = SiftExtractor(SiftOptions(max_features=count)).extract(photo)
     places = np.unique(few.keypoints[:, :3], axis=0)
     # A place with two orientations counts once, and keeps both.
     assert len(places) == count < len(few)
@@ -176,7 +176,7 @@ def test_colours_are_those_under_the_keypoints():
 
 
 def test_types_and_shapes():
-    features = SiftExtractor(80).extract(photo_of(texture()))
+    features = SiftExtractor(SiftOptions(max_features=80)).extract(photo_of(texture()))
     count = len(features)
     assert len(np.unique(features.keypoints[:, :3], axis=0)) == 80
     assert features.keypoints.shape == (count, 4)
@@ -196,7 +196,7 @@ def test_a_flat_photo_has_none():
 
 
 def test_threads_may_share_an_extractor():
-    sift = SiftExtractor(200)
+    sift = SiftExtractor(SiftOptions(max_features=200))
     photos = [photo_of(texture(seed=seed)) for seed in range(4)]
     alone = [sift.extract(photo) for photo in photos]
     with ThreadPoolExecutor(4) as pool:
@@ -206,6 +206,39 @@ def test_threads_may_share_an_extractor():
         np.testing.assert_array_equal(one.descriptors, other.descriptors)
 
 
-def test_no_features_asked_for_is_refused():
-    with pytest.raises(ConfigError, match="max_features must be at least 1, got 0"):
-        SiftExtractor(0)
+def test_more_are_described_to_keep_larger_ones():
+    photo = photo_of(texture())
+    by_response, by_scale = (
+        SiftExtractor(SiftOptions(max_features=50, described_per_kept=count)).extract(photo)
+        for count in (1, 4)
+    )
+    assert len(by_response) < 100
+    assert by_scale.keypoints[:, 2].mean() > 1.1 * by_response.keypoints[:, 2].mean()
+
+
+def test_the_size_of_a_photo_decides_on_its_contrast_threshold():
+    photo = photo_of(texture())
+    pixels = photo.pixels.shape[0] * photo.pixels.shape[1]
+
+    def count(**options: float) -> int:
+        return len(SiftExtractor(SiftOptions(**options)).extract(photo))
+
+    small, large = {"large_photo_px": pixels + 1}, {"large_photo_px": pixels}
+    assert count(**small) > count(**large) > 0
+    assert count(**small, small_photo_contrast_threshold=0.04) == count(**large)
+    assert count(**large, contrast_threshold=0.02) == count(**small)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"max_features": 0}, "max_features must be at least 1, got 0"),
+        ({"described_per_kept": 0}, "described_per_kept must be at least 1, got 0"),
+        ({"large_photo_px": -1}, "large_photo_px must not be negative, got -1"),
+        ({"contrast_threshold": 0.0}, "contrast_threshold must be above 0 and below 1, got 0.0"),
+        ({"small_photo_contrast_threshold": 1.0}, "small_photo_contrast_threshold must be above"),
+    ],
+)
+def test_values_out_of_range_are_refused_by_name(wrong, message):
+    with pytest.raises(ConfigError, match=f"^{message}"):
+        SiftOptions(**wrong)

@@ -43,14 +43,15 @@ def distances(baseline: np.ndarray, rays1: np.ndarray, rays2: np.ndarray) -> np.
 
 
 @BASELINES
-def test_just_those_in_the_band_meet_and_only_once(baseline):
+@pytest.mark.parametrize("min_sine", [MIN_SINE, 0.3])
+def test_just_those_in_the_band_meet_and_only_once(baseline, min_sine):
     rng = np.random.default_rng(0)
     rays1, rays2 = looking(rng, 500), looking(rng, 700)
     planes = EpipolarPlanes(np.array(baseline), rays1, rays2)
-    times = met(planes.mask(BAND_RAD), 500, 700)
+    times = met(planes.mask(BAND_RAD, min_sine=min_sine), 500, 700)
     axis = unit(np.array(baseline))
     told = np.ix_(
-        *(np.linalg.norm(np.cross(rays, axis), axis=1) > MIN_SINE for rays in (rays1, rays2))
+        *(np.linalg.norm(np.cross(rays, axis), axis=1) > min_sine for rays in (rays1, rays2))
     )
     apart = distances(np.array(baseline), rays1, rays2)[told]
     assert times.max() == 1
@@ -78,7 +79,7 @@ def test_what_has_no_ray_meets_nothing():
     rays1, rays2 = looking(rng, 50), looking(rng, 60)
     rays1[3] = rays2[7] = np.nan
     planes = EpipolarPlanes(np.array(SIDEWAYS), rays1, rays2)
-    times = met(planes.mask(0.5), 50, 60)
+    times = met(planes.mask(0.5, min_sine=MIN_SINE), 50, 60)
     assert not times[3].any()
     assert not times[:, 7].any()
     assert times.any()
@@ -89,4 +90,4 @@ def test_what_has_no_ray_meets_nothing():
 def test_photos_without_features_are_fine(count1, count2):
     rng = np.random.default_rng(3)
     planes = EpipolarPlanes(np.array(SIDEWAYS), looking(rng, count1), looking(rng, count2))
-    assert met(planes.mask(BAND_RAD), count1, count2).sum() == 0
+    assert met(planes.mask(BAND_RAD, min_sine=MIN_SINE), count1, count2).sum() == 0

@@ -131,11 +131,50 @@ def test_matches_that_turn_otherwise_are_left_out(orbit, views, truth, guided):
     assert len(inliers(float(turn) + np.pi)) < MAX_WRONG * len(inliers(None))
 
 
+def matches_with(views, truth, candidate: RankedCandidate, **options: float) -> np.ndarray:
+    """(M, 2) matches of the query and the candidate; none if there is no pair."""
+    with WorkerPool(1) as workers:
+        guided = GuidedMatcher(
+            GuidedOptions(**options), MatchingOptions(), VerificationOptions(), workers
+        )
+        pairs = guided.match(views[QUERY], truth[QUERY], [candidate], views, truth)
+    return pairs[0].matches if pairs else np.zeros((0, 2), np.uint32)
+
+
+def test_features_too_close_to_the_epipole_are_left_out(orbit, views, truth):
+    candidate, min_sine = looked_at(orbit, NEAR), 0.9
+    baseline = truth[NEAR].center - truth[QUERY].center
+    found = matches_with(views, truth, candidate, min_baseline_sine=min_sine)
+    assert 15 <= len(found) < len(matches_with(views, truth, candidate))
+    for side, index in enumerate((QUERY, NEAR)):
+        rays = truth[index].rays(views[index].features.keypoints[found[:, side]])
+        across = np.linalg.norm(np.cross(rays, baseline / np.linalg.norm(baseline)), axis=1)
+        assert across.min() >= min_sine - 1e-9
+
+
+def test_how_far_a_match_may_deviate_from_the_rotation_is_an_option(orbit, views, truth):
+    keypoints = [views[i].features.keypoints for i in (QUERY, NEAR)]
+    pairs = true_matches(orbit, QUERY, NEAR)
+    turn = float(np.median(keypoints[1][pairs[:, 1], 3] - keypoints[0][pairs[:, 0], 3]))
+    candidate = replace(looked_at(orbit, NEAR), rotation_rad=turn)
+    numbers = [
+        len(matches_with(views, truth, candidate, rotation_tolerance_deg=tolerance))
+        for tolerance in (10, 20, 180)
+    ]
+    assert 15 <= numbers[0] < numbers[1] < numbers[2]
+    anyhow = replace(candidate, rotation_rad=None)
+    assert numbers[2] == len(matches_with(views, truth, anyhow))
+
+
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         ({"max_ratio": 0.0}, "max_ratio must be above 0"),
         ({"min_agreeing": 1.1}, "min_agreeing must be above 0 and at most 1, got 1.1"),
+        ({"min_baseline_sine": 0.0}, "min_baseline_sine must be above 0 and below 1, got 0.0"),
+        ({"min_baseline_sine": 1.0}, "min_baseline_sine must be above 0 and below 1, got 1.0"),
+        ({"rotation_tolerance_deg": 0.0}, "rotation_tolerance_deg must be above 0 and at most 180"),
+        ({"rotation_tolerance_deg": 181.0}, "at most 180, got 181.0"),
     ],
 )
 def test_values_out_of_range_are_refused_by_name(wrong, message):

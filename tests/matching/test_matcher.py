@@ -7,6 +7,7 @@ import pytest
 from helpers.photo_stream import no_features
 
 from sfm_front.evaluation.synthetic.scene import make_scene
+from sfm_front.matching.in_plane_rotation import RotationOptions
 from sfm_front.matching.matcher import CpuMatcher, make_matcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors, match_rotated
 from sfm_front.matching.torch_matcher import TorchMatcher
@@ -39,14 +40,16 @@ def test_each_pair_is_matched_as_it_is_alone(photos, num_threads):
     np.testing.assert_array_equal(found[1], match_rotated(query, others[1], 0.1, OPTIONS))
 
 
+@pytest.mark.parametrize("rotation", [RotationOptions(), RotationOptions(tolerance_deg=60)])
 @pytest.mark.parametrize("at_once", [2**29, 2000])
-def test_torch_finds_the_same(photos, at_once, monkeypatch):
+def test_torch_finds_the_same(photos, at_once, rotation, monkeypatch):
     monkeypatch.setattr("sfm_front.matching.torch_matcher._MAX_SIMILARITIES", at_once)
     query, *others = photos
     others = [*others[:3], others[3].largest(40)]
-    torch_matcher = TorchMatcher(OPTIONS, "cpu")
+    options = MatchingOptions(rotation=rotation)
+    torch_matcher = TorchMatcher(options, "cpu")
     with WorkerPool(1) as workers:
-        cpu_matcher = CpuMatcher(OPTIONS, workers)
+        cpu_matcher = CpuMatcher(options, workers)
         for rotations_rad in ([None] * len(others), TURNS_RAD):
             expected = cpu_matcher.match(query, others, rotations_rad)
             found = torch_matcher.match(query, others, rotations_rad)

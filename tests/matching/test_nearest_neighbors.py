@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import make_scene
+from sfm_front.matching.in_plane_rotation import RotationOptions
 from sfm_front.matching.match_mask import MaskBlock, MatchMask
 from sfm_front.matching.nearest_neighbors import (
     MatchingOptions,
@@ -173,6 +174,18 @@ def test_only_those_turned_alike_match(neighbours):
     found = {tuple(row) for row in match_rotated(*photos, 2.5, MatchingOptions()).tolist()}
     assert {tuple(row) for row in matches[1::2].tolist()} <= found
     assert not found & {tuple(row) for row in opposed.tolist()}
+
+
+def test_how_far_a_feature_may_deviate_from_the_rotation_is_an_option(neighbours):
+    photos = [
+        oriented(part, np.full(len(part), angle))
+        for part, angle in zip(neighbours, (0, np.deg2rad(50)), strict=True)
+    ]
+    loose = MatchingOptions(rotation=RotationOptions(tolerance_deg=60))
+    assert len(match_rotated(*photos, 0.0, MatchingOptions())) == 0
+    np.testing.assert_array_equal(
+        match_rotated(*photos, 0.0, loose), match_descriptors(*neighbours, MatchingOptions())
+    )
 
 
 def test_a_second_nearest_that_is_turned_elsewhere_does_not_make_it_ambiguous(neighbours):

@@ -212,6 +212,27 @@ def test_a_sample_serves_as_well_as_all():
     assert_pose_is_true(pair, sampled.two_view_geometry.cam2_from_cam1)
 
 
+def test_a_gate_that_is_less_sure_misses_more():
+    pairs = [make_pair(100, 200, seed=seed) for seed in range(4)]
+
+    def num_inliers(**options: float) -> int:
+        verifier = Verifier(VerificationOptions(**options))
+        return sum(verifier.count_inliers(p.view1, p.view2, p.matches) for p in pairs)
+
+    assert num_inliers() > RECALL * 400
+    assert num_inliers(gate_confidence=1e-9) < 0.8 * num_inliers()
+    assert num_inliers(max_gate_trials=1) < 0.8 * num_inliers()
+
+
+def test_more_trials_find_other_models():
+    """Where few do not find the best one already, which is so for most pairs."""
+    pairs = [make_pair(300, 300, seed=seed) for seed in (0, 6)]
+    few, many = (
+        [outcome(verified(pair, min_model_trials=count)) for pair in pairs] for count in (1, 10_000)
+    )
+    assert few != many
+
+
 def test_the_essential_matrix_brings_back_what_the_gate_lost(monkeypatch):
     pair = make_pair(400, 100, seed=6)
     half = pair.is_true & (np.arange(500) % 2 == 0)
@@ -262,6 +283,12 @@ def test_the_same_pair_gives_the_same_to_the_bit_on_any_thread():
         ({"max_error_px": 0.0}, "max_error_px must be above 0"),
         ({"min_inliers": 7}, "min_inliers must be at least 8"),
         ({"model_sample": 10}, r"model_sample must be at least min_inliers \(15\), got 10"),
+        ({"max_gate_trials": 0}, "max_gate_trials must be at least 1, got 0"),
+        ({"gate_confidence": 0.0}, "gate_confidence must be above 0 and below 1, got 0.0"),
+        ({"gate_confidence": 1.0}, "gate_confidence must be above 0 and below 1, got 1.0"),
+        ({"min_model_trials": 0}, "min_model_trials must be from 1 to 10000, got 0"),
+        ({"min_model_trials": 10_001}, "min_model_trials must be from 1 to 10000, got 10001"),
+        ({"max_error_px": float("nan")}, "max_error_px must be above 0, got nan"),
     ],
 )
 def test_values_out_of_range_are_refused(wrong, message):

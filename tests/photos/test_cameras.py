@@ -12,13 +12,14 @@ from PIL import Image
 from PIL.TiffImagePlugin import IFDRational
 
 from sfm_front.errors import ConfigError
-from sfm_front.photos.cameras import PHOTOS_PER_SIZE, CameraCatalog, CameraOptions, focal_prior_px
+from sfm_front.photos.cameras import CameraCatalog, CameraOptions, focal_prior_px
 from sfm_front.photos.exif import FULL_FRAME_DIAGONAL_MM
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.types import Exif, Photo
 
 PHONE = Exif(make="Maker", model="Phone", focal_length_mm=4.0, focal_length_35mm=28.0)
 NO_EXIF = Exif()
+PHOTOS_PER_SIZE = CameraOptions().photos_per_size
 
 
 def photo(name: str, size: tuple[int, int] = (400, 300), exif: Exif = PHONE) -> Photo:
@@ -83,6 +84,16 @@ def test_one_odd_size_does_not_end_the_sharing() -> None:
     assert chosen.count(1) == len(frames)
 
 
+@pytest.mark.parametrize(("photos_per_size", "expected"), [(3, [1, 1, 2, 2]), (4, [1, 1, 2, 3])])
+def test_a_second_size_is_shared_once_there_are_enough_photos(
+    photos_per_size: int, expected: list[int]
+) -> None:
+    photos = [photo(f"{i}.png", exif=NO_EXIF) for i in range(2)]
+    photos += [photo(f"{i} odd.png", (500, 500), exif=NO_EXIF) for i in range(2)]
+    catalog = CameraCatalog(CameraOptions(photos_per_size=photos_per_size))
+    assert ids(catalog, photos) == expected
+
+
 SHARING_PHOTOS = [
     photo("x/a.jpg"),
     photo("x/b.jpg", exif=NO_EXIF),
@@ -133,8 +144,17 @@ def test_the_35_mm_equivalent_gives_the_prior() -> None:
 @pytest.mark.parametrize("focal_35mm", [0.5, 1e6])
 def test_an_absurd_focal_length_is_no_prior(focal_35mm: float) -> None:
     absurd = photo("a.jpg", exif=replace(PHONE, focal_length_35mm=focal_35mm))
-    assert focal_prior_px(absurd) is None
+    assert focal_prior_px(absurd, CameraOptions()) is None
     assert not CameraCatalog().camera_for(absurd).camera.has_prior_focal_length
+
+
+@pytest.mark.parametrize("limits", [{"min_focal_factor": 0.9}, {"max_focal_factor": 0.7}])
+def test_what_is_plausible_is_an_option(limits: dict[str, float]) -> None:
+    """The phone's focal length is 0.81 of the long side."""
+    assert focal_prior_px(photo("a.jpg"), CameraOptions()) is not None
+    assert focal_prior_px(photo("a.jpg"), CameraOptions(**limits)) is None  # type: ignore[arg-type]
+    camera = CameraCatalog(CameraOptions(**limits)).camera_for(photo("a.jpg")).camera  # type: ignore[arg-type]
+    assert not camera.has_prior_focal_length
 
 
 def saved(path: Path, make: str, model: str, focal_mm: float) -> Photo:
@@ -150,13 +170,16 @@ def saved(path: Path, make: str, model: str, focal_mm: float) -> Photo:
 def test_the_camera_database_knows_sensor_widths(tmp_path: Path) -> None:
     """A Canon EOS 5D Mark II has a sensor 36 mm wide."""
     known = saved(tmp_path / "a.jpg", "Canon", "Canon EOS 5D Mark II", 30.0)
-    assert focal_prior_px(known) == pytest.approx(400 * 30 / 36, rel=0.01)
-    assert focal_prior_px(saved(tmp_path / "b.jpg", "Nobody", "Nothing", 30.0)) is None
+    assert focal_prior_px(known, CameraOptions()) == pytest.approx(400 * 30 / 36, rel=0.01)
+    assert (
+        focal_prior_px(saved(tmp_path / "b.jpg", "Nobody", "Nothing", 30.0), CameraOptions())
+        is None
+    )
 
 
 def test_a_format_that_pycolmap_cannot_read_has_no_prior(tmp_path: Path) -> None:
     webp = saved(tmp_path / "a.webp", "Canon", "Canon EOS 5D Mark II", 30.0)
-    assert focal_prior_px(webp) is None
+    assert focal_prior_px(webp, CameraOptions()) is None
 
 
 def test_shrinking_a_photo_keeps_its_field_of_view(tmp_path: Path) -> None:
@@ -170,7 +193,7 @@ def test_shrinking_a_photo_keeps_its_field_of_view(tmp_path: Path) -> None:
     Image.new("RGB", (400, 300)).save(tmp_path / "a.jpg", exif=exif)
     read = PhotoReader().read(tmp_path / "a.jpg", "a.jpg")
     assert isinstance(read, Photo)
-    assert focal_prior_px(read) == pytest.approx(400 * 30 / 24, rel=1e-4)
+    assert focal_prior_px(read, CameraOptions()) == pytest.approx(400 * 30 / 24, rel=1e-4)
 
 
 @pytest.mark.parametrize("model", ["PINHOLE", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV"])
@@ -209,6 +232,13 @@ def test_calibration_of_another_size_is_refused() -> None:
         ({"model": "PINHOLE", "params": (1.0, 2.0, 3.0)}, r"4 numbers \(fx, fy, cx, cy\), got 3"),
         ({"params": (1.0, 2.0, 3.0, math.nan)}, "finite"),
         ({"params": (-500.0, 200.0, 150.0, 0.0)}, r"\(f, cx, cy, k\): focal lengths.*above 0"),
+        ({"photos_per_size": 0}, "photos_per_size must be at least 1, got 0"),
+        ({"min_focal_factor": 0.0}, "min_focal_factor must be above 0, got 0.0"),
+        ({"min_focal_factor": math.nan}, "min_focal_factor must be above 0, got nan"),
+        (
+            {"max_focal_factor": 0.1},
+            r"max_focal_factor must be above min_focal_factor \(0.1\), got 0.1",
+        ),
     ],
 )
 def test_wrong_options_are_refused_when_built(options: dict[str, object], message: str) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sfm_front.errors import ConfigError
 from sfm_front.features.global_descriptors.unit_vectors import unit_length
-from sfm_front.retrieval.index import SHORTLIST, CosineIndex
+from sfm_front.retrieval.index import CosineIndex, IndexOptions
 
 DIMENSION = 1000
+SHORTLIST = IndexOptions().shortlist
 COSINE_TOLERANCE = 5e-3  # 8 bits a number
 
 
@@ -17,8 +19,8 @@ def random_vectors(count: int, dimension: int = DIMENSION) -> np.ndarray:
     return unit_length(rng.normal(size=(count, dimension)).astype(np.float32))
 
 
-def index_of(vectors: np.ndarray) -> CosineIndex:
-    index = CosineIndex(vectors.shape[1])
+def index_of(vectors: np.ndarray, **options: int) -> CosineIndex:
+    index = CosineIndex(vectors.shape[1], IndexOptions(**options))
     for image_id, vector in enumerate(vectors):
         index.add(image_id, vector)
     return index
@@ -147,3 +149,32 @@ def test_a_query_widened_with_photos_is_the_sum_with_those():
     expected = vectors @ unit_length(wide)
     np.testing.assert_allclose(expected[order], np.sort(expected)[::-1], atol=COSINE_TOLERANCE)
     assert order != np.argsort(-exact).tolist()
+
+
+def test_a_longer_shortlist_finds_more_of_the_nearest():
+    vectors = random_vectors(4 * SHORTLIST)
+    nearest = np.argsort(-(vectors @ vectors[5]))[:10]
+    exhaustive, brief = (
+        {c.image_id for c in index_of(vectors, shortlist=shortlist).query(vectors[5], 10)}
+        for shortlist in (len(vectors), 1)
+    )
+    assert exhaustive == set(nearest)
+    assert not exhaustive <= brief
+
+
+@pytest.mark.parametrize(("depth", "reordered"), [(1, 20), (30, 30)])
+def test_an_expanded_query_orders_just_the_nearest(depth, reordered):
+    """Expanded with the photo least like the query, which puts those like that one first."""
+    vectors = spread_around(random_vectors(7)[3], 40)
+    query = vectors[15]
+    exact = vectors @ query
+    found = index_of(vectors, expansion_depth=depth).query(query, 10, expand_with=[0])
+    expanded = vectors @ (query + exact[0] * vectors[0])
+    near = np.argsort(-exact)[:reordered]
+    assert [c.image_id for c in found] == near[np.argsort(-expanded[near])][:10].tolist()
+
+
+@pytest.mark.parametrize("name", ["shortlist", "expansion_depth"])
+def test_values_out_of_range_are_refused_by_name(name):
+    with pytest.raises(ConfigError, match=f"{name} must be at least 1, got 0"):
+        IndexOptions(**{name: 0})

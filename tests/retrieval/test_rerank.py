@@ -10,6 +10,7 @@ from helpers.photo_stream import no_features, true_matches, view_of
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.matching.in_plane_rotation import RotationOptions
 from sfm_front.matching.matcher import CpuMatcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import Verifier
@@ -34,13 +35,20 @@ def views(orbit) -> dict[int, View]:
 
 @pytest.fixture
 def make_reranker():
-    """A re-ranker of so many features, on so many threads that end with the test."""
+    """A re-ranker with these options, on threads that end with the test."""
     with ExitStack() as stack:
 
-        def make(max_features: int = 800, num_threads: int = 1) -> Reranker:
+        def make(
+            num_threads: int = 1, rotation: RotationOptions | None = None, **options: int
+        ) -> Reranker:
             workers = stack.enter_context(WorkerPool(num_threads))
-            options = RerankOptions(max_features=max_features)
-            return Reranker(options, CpuMatcher(MatchingOptions(), workers), Verifier(), workers)
+            return Reranker(
+                RerankOptions(**options),
+                CpuMatcher(MatchingOptions(), workers),
+                Verifier(),
+                workers,
+                rotation=rotation,
+            )
 
         yield make
 
@@ -82,12 +90,21 @@ def test_equals_are_ordered_by_cosine(views, make_reranker):
     assert [(c.image_id, c.inliers) for c in ranked] == [(21, 0), (22, 0), (20, 0)]
 
 
-@pytest.mark.parametrize(("enough", "looked_at"), [(8, 12), (13, 20), (None, 20)])
-def test_it_stops_once_enough_are_good(views, make_reranker, enough, looked_at):
+@pytest.mark.parametrize(
+    ("options", "enough", "looked_at"),
+    [
+        ({}, 8, 12),
+        ({}, 13, 20),
+        ({}, None, 20),
+        ({"batch_size": 5}, 8, 10),
+        ({"batch_size": 5, "good_inliers": 10_000}, 8, 20),
+    ],
+)
+def test_it_stops_once_enough_are_good(views, make_reranker, options, enough, looked_at):
     """All are photo 1; those that were not looked at are left out."""
     candidates = [Candidate(100 + index, 0.5 - 0.01 * index) for index in range(20)]
     among = {candidate.image_id: views[1] for candidate in candidates}
-    ranked = make_reranker().rerank(views[QUERY], candidates, among, enough=enough)
+    ranked = make_reranker(**options).rerank(views[QUERY], candidates, among, enough=enough)
     assert [c.image_id for c in ranked] == [c.image_id for c in candidates][:looked_at]
 
 
@@ -105,6 +122,12 @@ def test_nothing_to_rank_is_nothing(views, make_reranker):
 def test_too_few_features_for_a_fundamental_matrix_are_refused():
     with pytest.raises(ConfigError, match="max_features must be at least 8, got 7"):
         RerankOptions(max_features=7)
+
+
+@pytest.mark.parametrize("name", ["batch_size", "good_inliers"])
+def test_values_out_of_range_are_refused_by_name(name):
+    with pytest.raises(ConfigError, match=f"rerank {name} must be at least 1, got 0"):
+        RerankOptions(**{name: 0})
 
 
 def test_features_are_matched_by_descriptor_not_by_place(orbit, views, make_reranker):
@@ -129,3 +152,6 @@ def test_it_tells_how_far_candidates_are_turned(views, make_reranker):
     assert further.rotation_rad - upright.rotation_rad == pytest.approx(1.0, abs=0.01)
     (stranger,) = make_reranker().rerank(views[QUERY], [Candidate(6, 0.5)], views)
     assert stranger.rotation_rad is None
+    strict = make_reranker(rotation=RotationOptions(min_matches=upright.inliers + 1))
+    (unsure,) = strict.rerank(views[QUERY], [Candidate(1, 0.5)], {1: view})
+    assert (unsure.inliers, unsure.rotation_rad) == (upright.inliers, None)

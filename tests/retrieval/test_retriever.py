@@ -12,6 +12,7 @@ from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.matching.matcher import CpuMatcher
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import Verifier
+from sfm_front.retrieval.index import IndexOptions
 from sfm_front.retrieval.rerank import Reranker, RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions, Retriever
 from sfm_front.runtime.worker_pool import WorkerPool
@@ -90,6 +91,23 @@ def test_where_none_was_verified_the_best_by_cosine_stand_in(retriever):
     found = retriever.rank(query, [ranked(1, 0.447, 14)], min_inliers=15)
     assert [c.image_id for c in found] == [c.image_id for c in first]
     assert found[[c.image_id for c in found].index(1)].inliers == 14
+
+
+def test_it_hands_its_options_to_the_index():
+    rng = np.random.default_rng(0)
+    vectors = rng.normal(size=(400, 64)).astype(np.float32)
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    nearest = set(np.argsort(-(vectors @ vectors[0]))[:10])
+    found = []
+    for shortlist in (len(vectors), 1):
+        options = RetrievalOptions(
+            candidates=10, num_expansion=0, index=IndexOptions(shortlist=shortlist)
+        )
+        retriever = Retriever(options, 64)
+        for image_id, vector in enumerate(vectors):
+            retriever.remember(image_id, vector)
+        found.append({c.image_id for c in retriever.candidates(vectors[0])})
+    assert found[0] == nearest != found[1]
 
 
 def test_no_candidates_asked_for_is_refused():

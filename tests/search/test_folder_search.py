@@ -12,7 +12,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.features.cached_extraction import CachedExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.photos.source import list_photos
 from sfm_front.retrieval.retriever import RetrievalOptions
@@ -36,7 +36,7 @@ class World:
         self.describer = CachedExtraction(
             folder / "index",
             PhotoReader(),
-            SiftExtractor(400),
+            SiftExtractor(SiftOptions(max_features=400)),
             {"vlad": GlobalDescriptor(local=[Vlad()])},
         )
         self.index = PhotoIndex(folder / "index", self.describer)

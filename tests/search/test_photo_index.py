@@ -14,7 +14,7 @@ from sfm_front.errors import InputError
 from sfm_front.features.cached_extraction import CachedExtraction
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.global_descriptors.vlad import Vlad
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.photos.source import list_photos
 from sfm_front.search.photo_index import PhotoIndex, Update
@@ -34,7 +34,7 @@ def update(folder: Path, *, max_features: int = 200) -> tuple[PhotoIndex, Update
     describer = CachedExtraction(
         location,
         PhotoReader(),
-        SiftExtractor(max_features),
+        SiftExtractor(SiftOptions(max_features=max_features)),
         {"vlad": GlobalDescriptor(local=[Vlad()])},
     )
     index = PhotoIndex(location, describer)
@@ -63,7 +63,10 @@ def test_a_folder_is_described_once(folder):
 def test_progress_counts_what_is_described(folder):
     location = folder.parent / "index"
     describer = CachedExtraction(
-        location, PhotoReader(), SiftExtractor(200), {"vlad": GlobalDescriptor(local=[Vlad()])}
+        location,
+        PhotoReader(),
+        SiftExtractor(SiftOptions(max_features=200)),
+        {"vlad": GlobalDescriptor(local=[Vlad()])},
     )
     told: list[tuple[int, int]] = []
     photos = list_photos(folder)
@@ -77,7 +80,7 @@ def test_progress_counts_what_is_described(folder):
 def test_views_and_vectors_are_those_of_the_photos(folder):
     index, _ = update(folder)
     photo = PhotoReader().read(folder / "2_0.png", "2_0.png")
-    features = SiftExtractor(200).extract(photo)
+    features = SiftExtractor(SiftOptions(max_features=200)).extract(photo)
     view = index[3]
     np.testing.assert_array_equal(view.features.descriptors, features.descriptors)
     assert (view.image_id, view.camera.width, view.camera.height) == (3, 320, 240)
@@ -93,7 +96,9 @@ def test_photos_that_come_go_and_change(folder):
     index, done = update(folder)
     assert (done.kept, done.described, done.removed) == (2, 2, 1)
     assert names(index) == ["0_0.png", "1_60.png", "2_0.png", "sub/2_70.png"]
-    changed = SiftExtractor(200).extract(PhotoReader().read(folder / "1_60.png", "x"))
+    changed = SiftExtractor(SiftOptions(max_features=200)).extract(
+        PhotoReader().read(folder / "1_60.png", "x")
+    )
     np.testing.assert_array_equal(index[2].features.descriptors, changed.descriptors)
     # What is of no use any more is gone from disk.
     assert len(stored(folder)) == 4

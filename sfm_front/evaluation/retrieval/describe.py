@@ -13,7 +13,7 @@ from sfm_front.evaluation.retrieval.types import BenchPhoto, Query
 from sfm_front.features.cached_extraction import CachedExtraction, CachedPhoto
 from sfm_front.features.feature_cache import Box
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
-from sfm_front.features.sift import SiftExtractor
+from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.cameras import CameraCatalog
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.types import PhotoPath, Skipped, View
@@ -39,7 +39,7 @@ class BenchExtraction:
         descriptors: Mapping[str, GlobalDescriptor],
         *,
         max_image_size: int = 1600,
-        max_features: int = 4000,
+        max_features: int = SiftOptions.max_features,
         num_threads: int = 1,
     ) -> None:
         """``cache``: a folder, created if missing, which datasets and settings may share.
@@ -53,7 +53,7 @@ class BenchExtraction:
         self._describer = CachedExtraction(
             cache,
             PhotoReader(max_image_size=max_image_size),
-            SiftExtractor(max_features),
+            SiftExtractor(SiftOptions(max_features=max_features)),
             {**descriptors, PerceptualHash.name: hashing},
         )
         self._num_threads = num_threads

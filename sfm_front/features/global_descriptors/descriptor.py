@@ -26,9 +26,9 @@ NAMES = (*NETWORKS, Vlad.name)
 AUTO_NETWORK = "resnet101_pool5"
 """The paper's network, which ``auto`` joins with VLAD if available."""
 
-# Best recall at 25 with MobileNetV2; ResNet101 was not measured (TUNING: vlad-weight).
 VLAD_WEIGHT = 0.8
-NETWORK_WEIGHT = 0.2
+"""VLAD's default weight beside one network: best recall at 25 with MobileNetV2; ResNet101 was not
+measured (TUNING: vlad-weight)."""
 
 
 Source_contra = TypeVar("Source_contra", contravariant=True)
@@ -65,18 +65,27 @@ class GlobalDescriptor:
         *,
         networks: Sequence[GlobalDescriptorPart[Uint8Array]] = (),
         local: Sequence[GlobalDescriptorPart[Features]] = (),
+        vlad_weight: float = VLAD_WEIGHT,
     ) -> None:
-        """``networks`` describe pixels, ``local`` describe features; at least one in total."""
+        """``networks`` describe pixels, ``local`` describe features; at least one in total.
+
+        Each of ``local`` weighs ``vlad_weight``, each of ``networks`` the rest up to 1. Raises
+        ConfigError for a weight that ``check_vlad_weight`` refuses.
+        """
+        check_vlad_weight(vlad_weight)
         parts: list[GlobalDescriptorPart[Any]] = [*networks, *local]
         self.name = "+".join(part.name for part in parts)
         self.dimension = sum(part.dimension for part in parts)
         self.fingerprint = "+".join(part.fingerprint for part in parts)
+        if networks and local:
+            self.fingerprint += f":vlad_weight={vlad_weight}"
         self.needs_pixels = len(networks) > 0
-        total = NETWORK_WEIGHT * len(networks) + VLAD_WEIGHT * len(local)
+        network_weight = 1 - vlad_weight
+        total = network_weight * len(networks) + vlad_weight * len(local)
         self._networks = tuple(networks)
-        self._network_factor = np.float32((NETWORK_WEIGHT / total) ** 0.5)
+        self._network_factor = np.float32((network_weight / total) ** 0.5)
         self._local = tuple(local)
-        self._local_factor = np.float32((VLAD_WEIGHT / total) ** 0.5)
+        self._local_factor = np.float32((vlad_weight / total) ** 0.5)
 
     def describe_pixels(self, pixels: Uint8Array) -> Float32Array:
         """(h, w, 3) uint8 RGB → the networks' part; empty if there is none."""
@@ -100,10 +109,17 @@ class GlobalDescriptor:
         return self.join(self.describe_pixels(pixels), self.describe_local(features))
 
 
+def check_vlad_weight(weight: float) -> None:
+    """Raise ConfigError unless both VLAD and the networks it is joined with count."""
+    if not 0 < weight < 1:
+        raise ConfigError(f"vlad_weight must be above 0 and below 1, got {weight}")
+
+
 def resolve(
     name: str,
     *,
     weights: Path | None = None,
+    vlad_weight: float = VLAD_WEIGHT,
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> tuple[GlobalDescriptor, str | None]:
@@ -111,15 +127,17 @@ def resolve(
 
     ``name`` is one of ``NAMES``, several joined by ``+``, or ``auto``: ResNet101 joined with VLAD
     if its weights are cached or can be downloaded, else VLAD. ``weights`` replaces the network's
-    official file; ``progress`` is called during a download.
+    official file; ``vlad_weight`` is VLAD's beside one network; ``progress`` is called during a
+    download.
 
     Raises:
-        ConfigError: no such name, one twice, or ``weights`` without exactly one network.
+        ConfigError: no such name, one twice, ``weights`` without exactly one network, or a wrong
+            ``vlad_weight``.
         WeightsError: weights requested by name or file are unavailable or unusable.
         DependencyError: a network was requested and torch cannot be loaded.
     """
     if name == AUTO:
-        return _automatic(weights, device, progress)
+        return _automatic(weights, vlad_weight, device, progress)
     parts = _split(name)
     networks = [part for part in parts if part in NETWORKS]
     if weights is not None and len(networks) != 1:
@@ -129,18 +147,18 @@ def resolve(
         )
     describers = [_network(part, weights, device, progress) for part in networks]
     local = [Vlad()] if Vlad.name in parts else []
-    return GlobalDescriptor(networks=describers, local=local), None
+    return GlobalDescriptor(networks=describers, local=local, vlad_weight=vlad_weight), None
 
 
 def _automatic(
-    weights: Path | None, device: str, progress: Progress | None
+    weights: Path | None, vlad_weight: float, device: str, progress: Progress | None
 ) -> tuple[GlobalDescriptor, str]:
     joined = f"{AUTO_NETWORK}+{Vlad.name}"
     if weights is not None:
-        descriptor, _ = resolve(joined, weights=weights, device=device)
+        descriptor, _ = resolve(joined, weights=weights, vlad_weight=vlad_weight, device=device)
         return descriptor, f"global descriptor: {joined}, with weights from {weights.name}"
     try:
-        descriptor, _ = resolve(joined, device=device, progress=progress)
+        descriptor, _ = resolve(joined, vlad_weight=vlad_weight, device=device, progress=progress)
     except (WeightsError, DependencyError) as error:
         return GlobalDescriptor(local=[Vlad()]), f"global descriptor: {Vlad.name}, because {error}"
     return descriptor, f"global descriptor: {joined}, with torchvision's weights"

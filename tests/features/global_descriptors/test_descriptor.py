@@ -14,7 +14,6 @@ from sfm_front.errors import ConfigError, WeightsError
 from sfm_front.features.global_descriptors import weights_download as weights_cache
 from sfm_front.features.global_descriptors.descriptor import (
     NAMES,
-    NETWORK_WEIGHT,
     VLAD_WEIGHT,
     GlobalDescriptor,
     resolve,
@@ -53,13 +52,14 @@ FEATURES = [features_of(np.full((6, 128), value, np.uint8)) for value in (3, 4)]
 NO_FEATURES = features_of(np.zeros((0, 128), np.uint8))
 
 
-def test_the_cosine_of_joined_vectors_is_the_weighted_mean_of_cosines():
-    joined = GlobalDescriptor(networks=[NETWORK], local=[LOCAL])
+@pytest.mark.parametrize("vlad_weight", [VLAD_WEIGHT, 0.3])
+def test_the_cosine_of_joined_vectors_is_the_weighted_mean_of_cosines(vlad_weight):
+    joined = GlobalDescriptor(networks=[NETWORK], local=[LOCAL], vlad_weight=vlad_weight)
     first, second = (joined.describe(*pair) for pair in zip(PIXELS, FEATURES, strict=True))
     of_network = NETWORK.describe(PIXELS[0]) @ NETWORK.describe(PIXELS[1])
     of_local = LOCAL.describe(FEATURES[0]) @ LOCAL.describe(FEATURES[1])
     assert first @ second == pytest.approx(
-        NETWORK_WEIGHT * of_network + VLAD_WEIGHT * of_local, abs=FLOAT32_NOISE
+        (1 - vlad_weight) * of_network + vlad_weight * of_local, abs=FLOAT32_NOISE
     )
     assert first @ first == pytest.approx(1.0, abs=FLOAT32_NOISE)
 
@@ -77,10 +77,24 @@ def test_shares_computed_apart_join_to_the_same_vector():
     apart = joined.join(joined.describe_pixels(PIXELS[0]), joined.describe_local(FEATURES[0]))
     np.testing.assert_array_equal(apart, joined.describe(PIXELS[0], FEATURES[0]))
     assert joined.name == "network+local"
-    assert joined.fingerprint == "fake:1+fake:1"
+    assert joined.fingerprint == f"fake:1+fake:1:vlad_weight={VLAD_WEIGHT}"
     assert joined.dimension == 50 == len(apart)
     assert apart.dtype == np.float32
     assert joined.needs_pixels
+
+
+def test_the_weight_changes_the_fingerprint_if_it_changes_the_vector():
+    def fingerprints(**parts: list[Fake]) -> set[str]:
+        return {GlobalDescriptor(**parts, vlad_weight=w).fingerprint for w in (0.5, 0.8)}
+
+    assert len(fingerprints(networks=[NETWORK], local=[LOCAL])) == 2
+    assert len(fingerprints(networks=[NETWORK])) == len(fingerprints(local=[LOCAL])) == 1
+
+
+@pytest.mark.parametrize("vlad_weight", [0.0, 1.0, -1.0, float("nan")])
+def test_a_weight_that_leaves_a_part_out_is_refused(vlad_weight):
+    with pytest.raises(ConfigError, match="vlad_weight must be above 0 and below 1, got"):
+        resolve("vlad", vlad_weight=vlad_weight)
 
 
 def test_a_photo_without_features_is_still_described_by_the_network():
@@ -158,8 +172,9 @@ def test_networks_are_loaded_from_the_cache(tmp_path, monkeypatch):
     file = tmp_path / "resnet101.pth"
     torch.save(ResNet101().state_dict(), file)
     monkeypatch.setattr(weights_cache, "cached_or_fetched", lambda *_, **__: file)
-    descriptor, message = resolve("auto")
+    descriptor, message = resolve("auto", vlad_weight=0.7)
     assert descriptor.name == "resnet101_pool5+vlad"
+    assert descriptor.fingerprint.endswith(":vlad_weight=0.7")
     assert message == "global descriptor: resnet101_pool5+vlad, with torchvision's weights"
     assert descriptor.dimension == 2048 + Vlad().dimension
 
