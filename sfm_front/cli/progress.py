@@ -43,13 +43,18 @@ class LiveLine:
 class ProgressLine(LiveLine):
     """Where a reconstruction stands, photo by photo."""
 
-    def __init__(self, total: int, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO) -> None:
         super().__init__(stream)
-        self._total = total
+        self._total = 0
         self._started = time.perf_counter()
         self._done = 0
         self._registered = 0
         self._points = 0
+
+    def expect(self, total: int) -> None:
+        """Time counts from now, to ``total`` photos."""
+        self._total = total
+        self._started = time.perf_counter()
 
     def show(self, event: Event) -> None:
         """Count a photo and show where things stand; other events change nothing."""

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from sfm_front.cli import arguments as shared
 from sfm_front.cli.progress import ProgressLine
 from sfm_front.errors import ConfigError
+from sfm_front.events import Listener
 from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.summary import closing_summary
 
@@ -38,7 +39,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "if it is called images)",
     )
     parser.add_argument(
-        "--overwrite", action="store_true", help="replace a reconstruction that is there"
+        "--overwrite",
+        action="store_true",
+        help="replace a reconstruction that is there, instead of continuing it",
+    )
+    parser.add_argument(
+        "--append",
+        action="store_true",
+        help="add these photos to the reconstruction of another folder, given by --output",
+    )
+    parser.add_argument(
+        "--events",
+        choices=["-"],
+        help="with -, print what happens as lines of JSON instead of the progress line",
     )
     parser.add_argument(
         "--text",
@@ -101,25 +114,49 @@ def run(arguments: argparse.Namespace) -> int:
 
     import pycolmap
 
+    from sfm_front.session.resume import named_in_session, nothing_to_do, outstanding
     from sfm_front.session.session import Session
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
-    progress = ProgressLine(len(photos), sys.stdout)
+    overwrite, append = arguments.overwrite, arguments.append
+    if not overwrite and nothing_to_do(output, options, folder, photos, append=append):
+        print(f"{output}: finished, and holds all photos of {folder}: nothing to do")
+        return 0
+    progress = ProgressLine(sys.stderr if arguments.events else sys.stdout)
+    on_event = _event_printer() if arguments.events else progress.show
     with (
-        Session(output, options, overwrite=arguments.overwrite, on_event=progress.show) as session,
+        Session(
+            output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
+        ) as session,
         _interruptible() as interrupted,
     ):
         for message in session.messages:
             progress.note(message)
-        for _ in session.add_all(photos):
+        named = named_in_session(session.database, folder, photos, output, append=append)
+        found = outstanding(session.database, named)
+        if session.num_restored:
+            progress.note(
+                f"continuing {output}: {session.num_restored} photos are in it, "
+                f"{len(found.new)} are new"
+            )
+        for name in found.changed:
+            progress.note(f"{name}: has changed since it was taken in; the old one stays")
+        progress.expect(len(found.new))
+        for _ in session.add_all(found.new):
             if interrupted():
                 progress.note("stopping: finishing with the photos taken so far")
                 break
         progress.finishing()
         result = session.finish()
         progress.end()
-        print(closing_summary(result.summary, output))
+        progress.note(closing_summary(result.summary, output))
     return 0 if result.models else 1
+
+
+def _event_printer() -> Listener:
+    from sfm_front.reports.event_log import EventLog
+
+    return EventLog(sys.stdout).write
 
 
 def _folder(text: str) -> Path:

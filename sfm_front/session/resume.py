@@ -12,7 +12,9 @@ from typing import Any
 
 from sfm_front.errors import InputError
 from sfm_front.session.options import SessionOptions
+from sfm_front.session.output_folder import DATABASE, check_output_folder, holds_session
 from sfm_front.storage.database import PhotoDatabase
+from sfm_front.storage.session_lock import SessionLock
 from sfm_front.types import FileState, PhotoPath
 
 _OPTIONS = "options"
@@ -21,7 +23,9 @@ _SOURCES = "sources"
 _RUNNING, _FINISHED = "running", "finished"
 
 # These say how the work is done, not what comes out of it.
-_FREE = frozenset({"threads", "device", "weights", "text", "snapshot_seconds", "cache_mb"})
+_FREE = frozenset(
+    {"threads", "num_threads", "device", "weights", "text", "snapshot_seconds", "cache_mb"}
+)
 
 
 def check_options(database: PhotoDatabase, options: SessionOptions, output: Path) -> bool:
@@ -136,6 +140,28 @@ def outstanding(database: PhotoDatabase, photos: Iterable[PhotoPath]) -> Outstan
     return Outstanding(new, changed, num_known)
 
 
+def nothing_to_do(
+    output: Path,
+    options: SessionOptions,
+    folder: Path,
+    photos: Sequence[PhotoPath],
+    *,
+    append: bool,
+) -> bool:
+    """Whether a finished session holds all these photos; asked before anything heavy is loaded.
+
+    Raises InputError if the session cannot be continued so, or another process writes to it.
+    """
+    check_output_folder(output, overwrite=False, resume=True)
+    if not holds_session(output):
+        return False
+    with SessionLock(output), PhotoDatabase(output / DATABASE) as database:
+        if not check_options(database, options, output) or not is_finished(database):
+            return False
+        named = named_in_session(database, folder, photos, output, append=append)
+        return not outstanding(database, named).new
+
+
 def _same(before: FileState, now: FileState) -> bool:
     return (before.size, before.mtime_ns) == (now.size, now.mtime_ns)
 
@@ -155,8 +181,8 @@ def _differences(
     before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = ""
 ) -> Iterable[tuple[str, Any, Any]]:
     """Dotted name, old and new value of what differs; options of one version only are passed."""
-    for name in before.keys() & now.keys():
-        if name in _FREE or name in ("num_threads",):
+    for name in now:
+        if name not in before or name in _FREE:
             continue
         full = f"{prefix}{name}"
         if isinstance(before[name], dict) and isinstance(now[name], dict):

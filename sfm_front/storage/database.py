@@ -314,7 +314,16 @@ class PhotoDatabase(Closeable):
         try:
             yield
         except sqlite3.Error as error:
-            raise StorageError(f"{self._path}: {error}") from error
+            raise StorageError(f"{self._path}: {error}. {_what_now(error)}") from error
+
+
+def _what_now(error: sqlite3.Error) -> str:
+    text = str(error)
+    if "full" in text:
+        return "Make room, and give the same command again: it goes on from here."
+    if "not a database" in text or "malformed" in text:
+        return "It is damaged: give --overwrite to begin anew, or another --output."
+    return "The same command goes on from here once that is mended."
 
 
 def _file(path: Path) -> dict[str, Any]:

@@ -181,12 +181,12 @@ def test_weights_that_are_not_there(photo, tmp_path, capsys):
     assert "none.pth" in line
 
 
-def test_an_output_that_holds_a_reconstruction(photo, tmp_path, capsys):
+def test_an_output_whose_database_is_damaged(photo, tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "database.db").write_bytes(b"kept")
     (tmp_path / "out" / "retrieval.jsonl").touch()
     line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out")
-    assert "holds a reconstruction already" in line
+    assert "database.db: file is not a database. It is damaged: give --overwrite" in line
     assert (tmp_path / "out" / "database.db").read_bytes() == b"kept"
 
 

@@ -29,13 +29,19 @@ def turn(monkeypatch):
     return later
 
 
+def expecting(total: int, stream: io.StringIO) -> ProgressLine:
+    line = ProgressLine(stream)
+    line.expect(total)
+    return line
+
+
 def placed(name: str, registered: int, points: int) -> PhotoAdded:
     return PhotoAdded(name, image_id=1, num_registered=registered, num_points=points)
 
 
 def test_without_a_terminal_there_is_a_line_a_photo(turn):
     stream = io.StringIO()
-    line = ProgressLine(4, stream)
+    line = expecting(4, stream)
     turn(2.0)
     line.show(placed("a.jpg", 0, 0))
     turn(4.0)
@@ -48,7 +54,7 @@ def test_without_a_terminal_there_is_a_line_a_photo(turn):
 
 def test_a_skipped_photo_is_named_with_its_reason_and_counts(turn):
     stream = io.StringIO()
-    line = ProgressLine(3, stream)
+    line = expecting(3, stream)
     line.show(placed("a.jpg", 5, 70))
     turn(1.0)
     skipped = Skipped("süd/b.jpg", SkipReason.DUPLICATE, "same file as a.jpg")
@@ -62,7 +68,7 @@ def test_a_skipped_photo_is_named_with_its_reason_and_counts(turn):
 def test_on_a_terminal_one_line_renews_itself(turn, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     stream = Terminal()
-    line = ProgressLine(200, stream)
+    line = expecting(200, stream)
     for number in range(3):
         turn(1.0)
         line.show(placed(f"{number}.jpg", number, 1_000_000))
@@ -74,7 +80,7 @@ def test_on_a_terminal_one_line_renews_itself(turn, monkeypatch):
 
 def test_a_note_on_a_terminal_stays():
     stream = Terminal()
-    line = ProgressLine(2, stream)
+    line = expecting(2, stream)
     line.show(placed("a.jpg", 0, 0))
     line.note("stopping")
     line.end()
@@ -83,7 +89,7 @@ def test_a_note_on_a_terminal_stays():
 
 def test_long_runs_are_told_in_hours(turn):
     stream = io.StringIO()
-    line = ProgressLine(3601, stream)
+    line = expecting(3601, stream)
     turn(2.0)
     line.show(placed("a.jpg", 0, 0))
     assert stream.getvalue().endswith("2:00:00 left\n")
@@ -91,7 +97,7 @@ def test_long_runs_are_told_in_hours(turn):
 
 def test_what_becomes_of_models_is_no_photo(turn):
     stream = io.StringIO()
-    line = ProgressLine(2, stream)
+    line = expecting(2, stream)
     line.show(ModelRefined(1, 2, 150, seconds=0.5))
     assert stream.getvalue() == ""
     turn(1.0)

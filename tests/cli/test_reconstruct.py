@@ -256,3 +256,61 @@ def test_text_is_written_beside_the_binary_form(five, tmp_path):
 )
 def test_the_output_is_named_after_the_folder(folder, output):
     assert default_output(Path(folder)) == Path(output)
+
+
+def test_the_same_command_again_has_nothing_to_do(five, tmp_path, capsys):
+    output = tmp_path / "out"
+    assert reconstruct(five, output) == 0
+    before = {path: path.read_bytes() for path in (output / "sparse").rglob("*.bin")}
+    assert len(before) >= 3
+    capsys.readouterr()
+    assert reconstruct(five, output) == 0
+    assert "finished, and holds all photos" in capsys.readouterr().out
+    assert {path: path.read_bytes() for path in (output / "sparse").rglob("*.bin")} == before
+
+
+def test_an_interrupted_run_is_continued_by_the_same_command(five, tmp_path, monkeypatch, capsys):
+    output = tmp_path / "out"
+    with monkeypatch.context() as patched:
+        interrupt_after(patched, 2)
+        reconstruct(five, output)
+    capsys.readouterr()
+    assert reconstruct(five, output) == 0
+    assert "2 photos are in it, 3 are new" in capsys.readouterr().out
+    report = json.loads((output / "report.json").read_text())
+    assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 6)]
+    assert report["totals"]["registered"] == 5
+
+
+def test_another_folder_is_added_when_asked(five, tmp_path, capsys):
+    """The second folder's names are taken, and one of its photos is in the first one, too."""
+    output, second = tmp_path / "out", tmp_path / "second"
+    second.mkdir()
+    for name, other in (("0001.jpg", "0004.jpg"), ("0002.jpg", "0005.jpg"), ("0003.jpg", None)):
+        shutil.copy(five / (other or name), second / name)
+    for name in ("0004.jpg", "0005.jpg"):
+        (five / name).unlink()
+    assert reconstruct(five, output) == 0
+    assert reconstruct(second, output) == 2
+    assert "Give --append to add those of" in capsys.readouterr().err
+    assert reconstruct(second, output, "--append") == 0
+    report = json.loads((output / "report.json").read_text())
+    registered = [row["name"] for row in report["photos"] if row["registered"]]
+    assert registered == ["0001.jpg", "0002.jpg", "0003.jpg", "second/0001.jpg", "second/0002.jpg"]
+    (copy,) = [row for row in report["photos"] if row["skipped"]]
+    assert copy["name"] == "second/0003.jpg"
+    assert report["totals"]["models"] == 1
+
+
+def test_events_are_printed_instead_of_the_progress(five, tmp_path, capsys):
+    assert reconstruct(five, tmp_path / "out", "--events", "-") == 0
+    printed = capsys.readouterr()
+    events = [json.loads(line) for line in printed.out.splitlines()]
+    assert [event["event"] for event in events][:2] == ["session_started", "photo_arrived"]
+    assert events[-1]["event"] == "session_ended"
+    assert [e["name"] for e in events if e["event"] == "photo_added"] == [
+        f"{n:04d}.jpg" for n in range(1, 6)
+    ]
+    assert "5 of 5 photos registered" in printed.err
+    written = (tmp_path / "out" / "events.jsonl").read_text().splitlines()
+    assert [json.loads(line)["event"] for line in written] == [e["event"] for e in events]
