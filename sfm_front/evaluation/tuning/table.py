@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from statistics import mean
 
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
-from sfm_front.evaluation.reconstruction.table import aligned
 from sfm_front.evaluation.tuning.constants import Sweep
 from sfm_front.evaluation.tuning.option_paths import Value
 from sfm_front.evaluation.tuning.trials import Trial, TrialKey
@@ -105,4 +104,7 @@ def _cell(row: Row, now: Row) -> str:
 
 def _lines(table: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [aligned(line, widths) for line in table]
+    return [
+        "  ".join([first.ljust(widths[0]), *map(str.rjust, rest, widths[1:])])
+        for first, *rest in table
+    ]
