@@ -85,6 +85,9 @@ def run(args: argparse.Namespace) -> None:
     progress = CountLine(
         "photo", sum(num_photos(scene, arrangements, len(options)) for scene in scenes), sys.stderr
     )
+    import pycolmap
+
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     trials: Trials = {}
     done: list[BenchmarkScene] = []
     try:

@@ -15,7 +15,7 @@ Row = Mapping[str, Trial]
 
 
 def format_sweep(sweep: Sweep, trials: Mapping[TrialKey, Trial]) -> str:
-    """A line per value over all scenes and, below, one per scene that tells values apart.
+    """A line per value over all scenes and, below, one per scene whose photos or AUC differ.
 
     Columns of arrangements and the cells of scenes count photos in the largest model, ``all`` those
     in any; ``error px`` and AUC, in percent, are means over scenes and arrangements, AUC over those
@@ -36,7 +36,7 @@ def format_sweep(sweep: Sweep, trials: Mapping[TrialKey, Trial]) -> str:
         header = [f"scene ({arrangements})", *(_label(sweep, value) for value in by_value)]
         text += ["", *_lines([header, *differing])]
     else:
-        text.append("no scene tells these values apart")
+        text.append("no scene differs in registered photos or AUC")
     return "\n".join(text)
 
 

@@ -94,4 +94,4 @@ def test_a_loss_is_marked_and_scenes_that_do_not_differ_are_left_out(text):
 
 def test_values_that_make_no_difference_are_said_so():
     same = trials_of({value: [trial("same", "name", 5)] for value in (NOW, OTHER)})
-    assert format_sweep(SWEEP, same).endswith("\nno scene tells these values apart")
+    assert format_sweep(SWEEP, same).endswith("\nno scene differs in registered photos or AUC")
