@@ -1,0 +1,156 @@
+"""Try other values of tuned options on real scenes, and say what each costs or brings.
+
+Photos are described once and kept in --cache; then each value gets a session per scene and
+arrangement: all photos in order of name, shuffled twice, and every second one. Ctrl-C ends with
+the scenes done so far.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from sfm_front.cli.progress import CountLine
+from sfm_front.errors import ConfigError, SfmFrontError
+from sfm_front.evaluation.machine import machine
+from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene
+from sfm_front.evaluation.tuning.arrangements import ARRANGEMENTS, arrange, check_arrangements
+from sfm_front.evaluation.tuning.constants import CONSTANTS, Sweep, make_sweep
+from sfm_front.evaluation.tuning.table import format_sweep
+from sfm_front.evaluation.tuning.trials import Trials, describe, find_scenes, try_scene
+from sfm_front.reports.summary import clock
+from sfm_front.session.options import SessionOptions
+from sfm_front.storage.json_files import write_json
+
+
+def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
+    listed = "".join(
+        f"\n  {c.name}, {c.path}: {', '.join(map(str, c.values))}\n    {c.decides}"
+        for c in CONSTANTS
+    )
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        epilog=f"Names, paths and the values tried:{listed}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "names",
+        nargs="+",
+        metavar="NAME",
+        help="one of those below, or the dotted path of any other option with --values",
+    )
+    parser.add_argument("--values", metavar="V,V,...", help="of one NAME, instead of its own")
+    parser.add_argument(
+        "--data", type=Path, required=True, metavar="FOLDER", help="holds a folder per scene"
+    )
+    parser.add_argument("--scenes", metavar="NAMES", help="separated by commas (default: all)")
+    parser.add_argument(
+        "--arrangements",
+        default=",".join(ARRANGEMENTS),
+        metavar="NAMES",
+        help="separated by commas (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--threads", type=int, default=1, metavar="N", help="1, the default, repeats to the bit"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of all RANSAC")
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        default=Path("outputs/tuning_cache"),
+        metavar="DIR",
+        help="keeps what photos were described by (default: %(default)s)",
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
+    return parser.parse_args(argv)
+
+
+def run(args: argparse.Namespace) -> None:
+    base = SessionOptions(global_descriptor="vlad", threads=args.threads, seed=args.seed)
+    values = args.values.split(",") if args.values else None
+    if values is not None and len(args.names) > 1:
+        raise ConfigError("--values goes with one NAME")
+    sweeps = [make_sweep(name, values, base) for name in args.names]
+    arrangements = args.arrangements.split(",")
+    check_arrangements(arrangements)
+    scenes = find_scenes(args.data, args.scenes.split(",") if args.scenes else None)
+    # Sweeps share the session with the current value of all of them.
+    options = list(dict.fromkeys(tried for sweep in sweeps for tried in sweep.options.values()))
+    progress = CountLine(
+        "photo", sum(num_photos(scene, arrangements, len(options)) for scene in scenes), sys.stderr
+    )
+    import pycolmap
+
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
+    trials: Trials = {}
+    done: list[BenchmarkScene] = []
+    try:
+        for scene in scenes:
+            started = perf_counter()
+            described = describe(scene, args.cache, base, progress.count)
+            trials |= try_scene(scene, described, arrangements, options, progress.count)
+            done.append(scene)
+            progress.note(f"{scene.name}: tried in {clock(perf_counter() - started)}")
+            if args.json:
+                write_json(args.json, as_dict(args, sweeps, trials))
+    except KeyboardInterrupt:
+        if not done:
+            raise
+    progress.end()
+    photos = sum(scene.num_photos for scene in done)
+    print(f"{len(done)} of {len(scenes)} scenes, {photos} photos; * is the current value")
+    for sweep in sweeps:
+        print("\n" + format_sweep(sweep, trials))
+
+
+def num_photos(scene: BenchmarkScene, arrangements: Sequence[str], num_options: int) -> int:
+    """How many photos are described or taken in."""
+    arriving = sum(len(arrange(range(scene.num_photos), name)) for name in arrangements)
+    return scene.num_photos + num_options * arriving
+
+
+def as_dict(args: argparse.Namespace, sweeps: Sequence[Sweep], trials: Trials) -> dict[str, object]:
+    return {
+        "settings": {
+            "threads": args.threads,
+            "seed": args.seed,
+            "global_descriptor": "vlad",
+            "data": args.data,
+        },
+        "machine": machine(),
+        "options": [
+            {
+                "path": sweep.path,
+                "current": sweep.current,
+                "trials": [
+                    {"value": value, **asdict(trial)}
+                    for value, options in sweep.options.items()
+                    for key, trial in trials.items()
+                    if key.options == options
+                ],
+            }
+            for sweep in sweeps
+        ],
+    }
+
+
+def main() -> int:
+    try:
+        run(parse())
+    except SfmFrontError as error:
+        print(f"tune: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("tune: interrupted before the first scene was done", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

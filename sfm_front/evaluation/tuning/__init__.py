@@ -1,0 +1,1 @@
+"""Tuned options tried again: other values of them, on many scenes, in several orders."""
