@@ -8,6 +8,7 @@ the scenes done so far.
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -82,9 +83,13 @@ def run(args: argparse.Namespace) -> None:
     scenes = find_scenes(args.data, args.scenes.split(",") if args.scenes else None)
     # Sweeps share the session with the current value of all of them.
     options = list(dict.fromkeys(tried for sweep in sweeps for tried in sweep.options.values()))
-    progress = CountLine(
-        "photo", sum(num_photos(scene, arrangements, len(options)) for scene in scenes), sys.stderr
-    )
+    progress = CountLine("photo", sys.stderr)
+    total = sum(num_photos(scene, arrangements, len(options)) for scene in scenes)
+    counter = itertools.count(1)
+
+    def count() -> None:
+        progress.show(next(counter), total)
+
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
@@ -93,8 +98,8 @@ def run(args: argparse.Namespace) -> None:
     try:
         for scene in scenes:
             started = perf_counter()
-            described = describe(scene, args.cache, base, progress.count)
-            trials |= try_scene(scene, described, arrangements, options, progress.count)
+            described = describe(scene, args.cache, base, count)
+            trials |= try_scene(scene, described, arrangements, options, count)
             done.append(scene)
             progress.note(f"{scene.name}: tried in {clock(perf_counter() - started)}")
             if args.json:

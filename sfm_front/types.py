@@ -56,6 +56,16 @@ class PhotoPath:
 
 
 @dataclass(frozen=True, slots=True)
+class NotYet:
+    """In place of the next item of a stream that goes on, but has none at the moment.
+
+    ``seconds``: how long nothing has come.
+    """
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
 class GeoPosition:
     """A WGS84 position: latitude and longitude in degrees, altitude in metres if known."""
 

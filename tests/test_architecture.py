@@ -57,6 +57,7 @@ LIBRARIES = {
     "open3d": ("sfm_front.viewers.open3d_loader",),
     "viser": (),
     "matplotlib": ("sfm_front.evaluation",),
+    "watchfiles": ("sfm_front.photos.folder_changes",),
 }
 
 MAX_FILES_AT_ROOT = 12

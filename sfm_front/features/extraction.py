@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, overload
 from weakref import WeakSet
 
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
@@ -17,6 +17,7 @@ from sfm_front.types import (
     ExtractedPhoto,
     Features,
     Float32Array,
+    NotYet,
     Photo,
     PhotoPath,
     Skipped,
@@ -75,7 +76,7 @@ class FeatureExtraction(Closeable):
         self._global = global_descriptor
         self._num_threads = num_threads
         self._networks = ThreadPoolExecutor(1, "sfm-network")
-        self._streams: WeakSet[Generator[ExtractedPhoto | Skipped, None, None]] = WeakSet()
+        self._streams: WeakSet[Generator[ExtractedPhoto | Skipped | NotYet, None, None]] = WeakSet()
 
     def describe(self, photo: PhotoPath) -> ExtractedPhoto | Skipped:
         """Read and describe one photo in the calling thread; networks run in a second one."""
@@ -104,8 +105,19 @@ class FeatureExtraction(Closeable):
             seconds=clock.seconds,
         )
 
-    def stream(self, photos: Iterable[PhotoPath]) -> Iterator[ExtractedPhoto | Skipped]:
-        """Describe photos in order, prefetching up to twice ``num_threads``."""
+    @overload
+    def stream(self, photos: Iterable[PhotoPath]) -> Iterator[ExtractedPhoto | Skipped]: ...
+    @overload
+    def stream(
+        self, photos: Iterable[PhotoPath | NotYet]
+    ) -> Iterator[ExtractedPhoto | Skipped | NotYet]: ...
+    def stream(
+        self, photos: Iterable[PhotoPath | NotYet]
+    ) -> Iterator[ExtractedPhoto | Skipped | NotYet]:
+        """Describe photos in order, prefetching up to twice ``num_threads``.
+
+        ``NotYet`` is handed on when every photo before it is described and taken.
+        """
         stream = prefetch(self.describe, photos, num_threads=self._num_threads)
         self._streams.add(stream)
         return stream

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import random
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Literal, get_args
@@ -32,12 +32,24 @@ def list_photos(folder: Path, *, exclude: Path | None = None) -> list[PhotoPath]
         raise InputError(f"{folder}: no such folder. Give the folder that holds the photos.")
     if not folder.is_dir():
         raise InputError(f"{folder}: not a folder. Give the folder that holds the photos.")
-    photos = [PhotoPath(_name_below(folder, path), path) for path in _walk(folder, exclude)]
+    photos = find_photos(folder, exclude=exclude, on_error=_warn)
     if not photos:
         raise InputError(
             f"{folder}: no photo in it or its sub-folders. "
             f"Photos end in {', '.join(EXTENSIONS)}, in upper or lower case."
         )
+    return photos
+
+
+def find_photos(
+    folder: Path, *, exclude: Path | None, on_error: Callable[[OSError], None]
+) -> list[PhotoPath]:
+    """As ``list_photos``, but there need not be any photo, nor the folder.
+
+    ``on_error`` hears of each folder that cannot be listed.
+    """
+    paths = _walk(folder, exclude, on_error)
+    photos = [PhotoPath(_name_below(folder, path), path) for path in paths]
     return sorted(photos, key=lambda photo: photo.name)
 
 
@@ -60,20 +72,23 @@ def _capture_time(photo: PhotoPath) -> datetime:
     return read_exif(photo.path).captured_at or datetime.max
 
 
-def _walk(folder: Path, exclude: Path | None) -> Iterator[Path]:
+def _warn(error: OSError) -> None:
+    logger.warning("%s: cannot be listed: %s", error.filename, error.strerror)
+
+
+def _walk(
+    folder: Path, exclude: Path | None, on_error: Callable[[OSError], None]
+) -> Iterator[Path]:
     """Paths of the photos below ``folder``; each folder once, even if links form a loop."""
-    seen = {_identity(folder)}
-    if exclude is not None and exclude.exists():
-        seen.add(_identity(exclude))
-
-    def warn(error: OSError) -> None:
-        logger.warning("%s: cannot be listed: %s", error.filename, error.strerror)
-
-    for root, folders, files in os.walk(folder, onerror=warn, followlinks=True):
+    # None stands for a folder that has vanished since it was listed.
+    seen = {None, folder_identity(folder)}
+    if exclude is not None:
+        seen.add(folder_identity(exclude))
+    for root, folders, files in os.walk(folder, onerror=on_error, followlinks=True):
         here = Path(root)
         kept = []
         for name in sorted(folders):
-            identity = _identity(here / name)
+            identity = folder_identity(here / name)
             if not name.startswith(".") and identity not in seen:
                 seen.add(identity)
                 kept.append(name)
@@ -83,8 +98,12 @@ def _walk(folder: Path, exclude: Path | None) -> Iterator[Path]:
                 yield here / name
 
 
-def _identity(folder: Path) -> tuple[int, int]:
-    status = folder.stat()
+def folder_identity(folder: Path) -> tuple[int, int] | None:
+    """Device and inode: the same by whatever path it is reached; None if it is not there."""
+    try:
+        status = folder.stat()
+    except OSError:
+        return None
     return status.st_dev, status.st_ino
 
 

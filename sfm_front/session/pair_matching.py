@@ -85,9 +85,9 @@ class CandidateMatcher:
     ) -> tuple[list[PairGeometry], dict[int, Rejected]]:
         """Candidates as re-ranked → verified pairs, and why others that were tried have none, by
         image id."""
-        options = self._options
-        first = candidates[: options.num_matched_first]
-        rest = candidates[options.num_matched_first : options.num_matched]
+        num_first = self._options.num_matched_first
+        chosen = candidates[: self._options.num_matched]
+        first, rest = chosen[:num_first], chosen[num_first:]
         pairs, rejected = self._match_unguided(query, first, views, clock)
         if rest:
             with clock.stage("locate"):

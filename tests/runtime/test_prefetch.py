@@ -10,6 +10,7 @@ import pytest
 from helpers.library_threads import library_threads, needs_blas, several_threads
 
 from sfm_front.runtime.prefetch import prefetch
+from sfm_front.types import NotYet
 
 
 def test_results_come_in_the_items_order_whatever_finishes_first():
@@ -51,6 +52,40 @@ def test_an_error_reaches_the_caller_in_its_turn():
     assert [next(results), next(results)] == [0, 1]
     with pytest.raises(ValueError, match="two"):
         next(results)
+
+
+def test_a_source_that_has_nothing_yet_keeps_no_result_waiting():
+    let_go = threading.Event()
+
+    def source() -> Iterator[int | NotYet]:
+        yield 0
+        yield 1
+        let_go.set()  # Only now can a result be there.
+        while len(taken) < 2:
+            yield NotYet(0.0)
+        yield NotYet(5.0)
+        yield 2
+
+    def wait(item: int) -> int:
+        assert let_go.wait(10)
+        return item
+
+    taken: list[int | NotYet] = []
+    for result in prefetch(wait, source(), num_threads=2):
+        taken.append(result)
+    assert [item for item in taken if item != NotYet(0.0)] == [0, 1, NotYet(5.0), 2]
+
+
+def test_items_that_come_while_a_result_is_under_way_are_begun():
+    meeting = threading.Barrier(2, timeout=10)
+
+    def source() -> Iterator[int | NotYet]:
+        yield 0
+        yield NotYet(0.0)
+        yield 1
+
+    results = prefetch(lambda item: (item, meeting.wait()), source(), num_threads=2)
+    assert [item for item, _ in results] == [0, 1]
 
 
 @needs_blas

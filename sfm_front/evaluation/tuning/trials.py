@@ -14,6 +14,7 @@ from sfm_front.evaluation.reconstruction.quality import Quality, assess
 from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene, find_scene
 from sfm_front.evaluation.tuning.arrangements import arrange
 from sfm_front.evaluation.tuning.option_paths import nearest
+from sfm_front.events import PhotoAdded
 from sfm_front.features.cached_extraction import CachedExtraction
 from sfm_front.features.extraction import make_extractor
 from sfm_front.features.global_descriptors.descriptor import resolve
@@ -92,7 +93,7 @@ def describe(
     extraction = CachedExtraction(
         cache,
         PhotoReader(max_image_size=options.max_image_size),
-        make_extractor(device, options.max_features),
+        make_extractor(device, options.sift),
         {descriptor.name: descriptor},
     )
     described: list[Described] = []
@@ -137,9 +138,11 @@ def run_trial(
         started = process_time()
         with Session(Path(folder), options) as session:
             for photo in arriving:
-                verified_pairs += len(session.add_extracted(photo).verified)
+                added = session.add_extracted(photo)
+                if isinstance(added, PhotoAdded):
+                    verified_pairs += len(added.verified)
                 count()
-            models = [summary.path for summary in session.finish()]
+            models = [model.path for model in session.finish().models]
         seconds = process_time() - started
         quality = assess(models, _limited_to(scene, [photo.name for photo in arriving]))
     return Trial(
