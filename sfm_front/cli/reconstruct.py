@@ -130,7 +130,10 @@ def _folder(text: str) -> Path:
 
 def default_output(folder: Path) -> Path:
     """``outputs/NAME`` below the working folder."""
-    resolved = folder.resolve()
+    try:
+        resolved = folder.resolve()
+    except (OSError, RuntimeError):  # Links in a circle, no working folder: listing will say so.
+        resolved = folder
     named = resolved.parent if resolved.name.lower() == "images" else resolved
     return Path("outputs") / (named.name or "photos")
 

@@ -114,6 +114,12 @@ def test_a_folder_that_is_missing(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_that_is_a_link_to_itself(tmp_path, capsys):
+    (tmp_path / "loop").symlink_to("loop")
+    line = refused(capsys, "reconstruct", tmp_path / "loop")
+    assert "loop: cannot be read (" in line
+
+
 def test_a_folder_without_photos(tmp_path, capsys):
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty" / "notes.txt").write_text("no photo")
