@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from sfm_front.cli import arguments as shared
 from sfm_front.cli.progress import ProgressLine
-from sfm_front.errors import ConfigError
+from sfm_front.errors import ConfigError, InputError
 from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.summary import closing_summary
 
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--text",
         action=argparse.BooleanOptionalAction,
-        help="whether to write models as text too",
+        help="whether to write models as text too; photo names must not hold spaces then",
     )
     parser.add_argument(
         "--config", type=Path, metavar="FILE", help="TOML of options; flags given here win over it"
@@ -101,8 +101,14 @@ def run(arguments: argparse.Namespace) -> int:
 
     import pycolmap
 
+    from sfm_front.exporters.colmap import first_name_lost_in_text
     from sfm_front.session.session import Session
 
+    if options.text and (lost := first_name_lost_in_text(photo.name for photo in listed)):
+        raise InputError(
+            f"{lost!r}: COLMAP's text format would cut this name at its white space. "
+            "Rename the photo, or leave --text out."
+        )
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
     progress = ProgressLine(len(photos), sys.stdout)
     with (

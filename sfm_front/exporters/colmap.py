@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import logging
+import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 
 from sfm_front.types import ModelSummary, Uint8Array
+
+logger = logging.getLogger(__name__)
+
+# What C++ takes for white space: COLMAP reads a name in a text model up to the first of it.
+_WHITE_SPACE = re.compile(r"[ \t\n\v\f\r]")
+
+
+def first_name_lost_in_text(names: Iterable[str]) -> str | None:
+    """The first photo name that COLMAP's text form cannot keep; None if it keeps them all."""
+    return next((name for name in names if _WHITE_SPACE.search(name)), None)
 
 
 def export_models(
@@ -21,7 +33,8 @@ def export_models(
 ) -> list[ModelSummary]:
     """Colour models and write them to ``folder/0``, ``folder/1``, … in the order given.
 
-    ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form.
+    ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form,
+    but not to a model with a photo whose name it cannot keep: a warning names the photo.
     Everything is written beside ``folder`` first and then moved into place, so that a crash
     leaves either the models that were there or the new ones, never a part. Where it happens
     between the two moves, the models that were there are in ``folder.old``.
@@ -36,7 +49,7 @@ def export_models(
         model.mkdir()
         reconstruction.write_binary(model)
         if text:
-            reconstruction.write_text(model)
+            _write_text(reconstruction, model)
         reconstruction.export_PLY(model / "points3D.ply")
         summaries.append(
             ModelSummary(
@@ -50,6 +63,14 @@ def export_models(
         )
     _replace(folder, fresh)
     return summaries
+
+
+def _write_text(reconstruction: pycolmap.Reconstruction, folder: Path) -> None:
+    lost = first_name_lost_in_text(image.name for image in reconstruction.images.values())
+    if lost is None:
+        reconstruction.write_text(folder)
+    else:
+        logger.warning("no model as text: COLMAP would cut the name %r at its white space", lost)
 
 
 def _replace(folder: Path, fresh: Path) -> None:

@@ -161,6 +161,13 @@ def test_options_that_cannot_be(photo, tmp_path, capsys, given, message):
     assert not (tmp_path / "out").exists()
 
 
+def test_names_that_text_models_would_cut(photo, tmp_path, capsys):
+    (photo / "a.png").rename(photo / "a b.png")
+    line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out", "--text")
+    assert "'a b.png'" in line
+    assert not (tmp_path / "out").exists()
+
+
 def test_weights_that_are_not_there(photo, tmp_path, capsys):
     line = refused(
         capsys,
