@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from sfm_front import __version__
 from sfm_front.cli import explain, reconstruct, retrieve, view
 from sfm_front.cli.logs import add_logging, logging_to
+from sfm_front.cli.signals import INTERRUPTED
 from sfm_front.errors import SfmFrontError
 
 
@@ -36,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
 
 
 def _add(

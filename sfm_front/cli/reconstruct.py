@@ -7,28 +7,34 @@ and it is placed in a model before the next one is taken.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from sfm_front.cli import arguments as shared
 from sfm_front.cli.progress import ProgressLine
+from sfm_front.cli.signals import leaving_at_signal
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.summary import closing_summary
 
 if TYPE_CHECKING:
     from sfm_front.session.options import SessionOptions
+    from sfm_front.types import PhotoPath
+
+_EXIT_STATUS = """\
+exit status: 0 models were written, 1 there is no model, 2 a mistake in what was given. The first
+Ctrl-C, SIGTERM or SIGHUP finishes with the photos taken so far, with 0 or 1 as ever; a second one,
+or one before the first photo, leaves at once with 130.
+"""
+_STOPPING = "stopping: finishing with the photos taken so far; once more leaves at once"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``reconstruct``. Defaults left out here are the session's."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = _EXIT_STATUS
     parser.set_defaults(usage_error=parser.error)
     parser.add_argument("folder", type=Path, nargs="?", help="photos, sub-folders included")
     parser.add_argument(
@@ -93,39 +99,43 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.folder is None:
         arguments.usage_error("the following arguments are required: folder")
-    folder: Path = arguments.folder
-    output: Path = arguments.output or default_output(folder)
-    listed = list_photos(folder, exclude=output)
-    options = session_options(arguments)
-    photos = order_photos(listed, arguments.order, seed=options.seed)
-
     import pycolmap
 
-    from sfm_front.exporters.colmap import first_name_lost_in_text
-    from sfm_front.session.session import Session
-
-    if options.text and (lost := first_name_lost_in_text(photo.name for photo in listed)):
-        raise InputError(
-            f"{lost!r}: COLMAP's text format would cut this name at its white space. "
-            "Rename the photo, or leave --text out."
-        )
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
-    progress = ProgressLine(len(photos), sys.stdout)
-    with (
-        Session(output, options, overwrite=arguments.overwrite, on_event=progress.show) as session,
-        _interruptible() as interrupted,
-    ):
+    # Once more: pycolmap has put a handler of its own for SIGTERM in place.
+    with leaving_at_signal(1):
+        from sfm_front.session.session import Session
+
+        output: Path = arguments.output or default_output(arguments.folder)
+        options = session_options(arguments)
+        photos = _photos(arguments, output, options)
+        progress = ProgressLine(len(photos), sys.stdout)
+        session = Session(output, options, overwrite=arguments.overwrite, on_event=progress.show)
+    with session, leaving_at_signal(2, _STOPPING) as interrupted:
         for message in session.messages:
             progress.note(message)
         for _ in session.add_all(photos):
             if interrupted():
-                progress.note("stopping: finishing with the photos taken so far")
                 break
         progress.finishing()
         result = session.finish()
         progress.end()
         print(closing_summary(result.summary, output))
     return 0 if result.models else 1
+
+
+def _photos(
+    arguments: argparse.Namespace, output: Path, options: SessionOptions
+) -> list[PhotoPath]:
+    from sfm_front.exporters.colmap import first_name_lost_in_text
+
+    listed = list_photos(arguments.folder, exclude=output)
+    if options.text and (lost := first_name_lost_in_text(photo.name for photo in listed)):
+        raise InputError(
+            f"{lost!r}: COLMAP's text format would cut this name at its white space. "
+            "Rename the photo, or leave --text out."
+        )
+    return order_photos(listed, arguments.order, seed=options.seed)
 
 
 def _folder(text: str) -> Path:
@@ -177,21 +187,3 @@ def _numbers(text: str | None) -> tuple[float, ...] | None:
         raise ConfigError(
             f"--camera-params takes numbers separated by commas, got {text!r}"
         ) from None
-
-
-@contextmanager
-def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Let the first Ctrl-C ask the loop to stop between two photos; the second one interrupts."""
-    asked = False
-
-    def ask(_number: int, _frame: FrameType | None) -> None:
-        nonlocal asked
-        if asked:
-            raise KeyboardInterrupt
-        asked = True
-
-    before = signal.signal(signal.SIGINT, ask)
-    try:
-        yield lambda: asked
-    finally:
-        signal.signal(signal.SIGINT, before)

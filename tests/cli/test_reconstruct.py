@@ -9,6 +9,7 @@ import shutil
 import signal
 import sqlite3
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import pycolmap
 import pytest
 from helpers.locations import VILLAGE
 from helpers.model_building import make_model
+from helpers.signal_handlers import default_handlers
 from PIL import Image
 
 from sfm_front.cli.main import main
@@ -160,8 +162,14 @@ def five(tmp_path) -> Path:
     return folder
 
 
-def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int) -> None:
-    """Send Ctrl-C when this many photos have been added."""
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    with default_handlers():
+        yield
+
+
+def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int, number: int) -> None:
+    """Send a signal when this many photos have been added."""
     show = ProgressLine.show
     shown = []
 
@@ -170,25 +178,28 @@ def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int) -> None:
         if isinstance(event, PhotoAdded):
             shown.append(event)
             if len(shown) == photos:
-                signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(number)
 
     monkeypatch.setattr(ProgressLine, "show", show_and_interrupt)
 
 
-def test_ctrl_c_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypatch, capsys):
-    interrupt_after(monkeypatch, 4)
-    handler = signal.getsignal(signal.SIGINT)
+@pytest.mark.usefixtures("handlers")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypatch, capfd, number):
+    interrupt_after(monkeypatch, 4, number)
+    handler = signal.getsignal(number)
     assert reconstruct(five, tmp_path / "out") == 0
-    assert "stopping: finishing with the photos taken so far" in capsys.readouterr().out
+    assert "stopping: finishing with the photos taken so far" in capfd.readouterr().err
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 5)]
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
     assert model.num_reg_images() == report["totals"]["registered"] >= 3
-    assert signal.getsignal(signal.SIGINT) is handler
+    assert signal.getsignal(number) is handler
 
 
+@pytest.mark.usefixtures("handlers")
 def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch, capsys):
-    interrupt_after(monkeypatch, 1)
+    interrupt_after(monkeypatch, 1, signal.SIGINT)
     assert reconstruct(five, tmp_path / "out") == 1
     assert "no model could be built" in capsys.readouterr().out
     assert list((tmp_path / "out" / "sparse").iterdir()) == []
