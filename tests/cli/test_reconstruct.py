@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import shutil
 import signal
@@ -204,6 +205,16 @@ def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch,
     assert "no model could be built" in capsys.readouterr().out
     assert list((tmp_path / "out" / "sparse").iterdir()) == []
     assert (tmp_path / "out" / "report.json").exists()
+
+
+def test_a_closed_pipe_does_not_cost_the_models(five, tmp_path, monkeypatch):
+    """As with ``| head -1``."""
+    receiver, sender = os.pipe()
+    os.close(receiver)
+    with os.fdopen(sender, "w") as pipe:
+        monkeypatch.setattr(sys, "stdout", pipe)
+        assert reconstruct(five, tmp_path / "out") == 0
+    assert pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0").num_reg_images() == 5
 
 
 def test_one_thread_and_a_seed_repeat_to_the_bit(five, tmp_path):
