@@ -10,7 +10,7 @@ import shutil
 import signal
 import sqlite3
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -205,6 +205,38 @@ def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch,
     assert "no model could be built" in capsys.readouterr().out
     assert list((tmp_path / "out" / "sparse").iterdir()) == []
     assert (tmp_path / "out" / "report.json").exists()
+
+
+def after_photo(monkeypatch: pytest.MonkeyPatch, name: str, act: Callable[[], object]) -> None:
+    """Do something when this photo has been added; on one thread, the next is being read then."""
+    show = ProgressLine.show
+
+    def show_and_act(line: ProgressLine, event: Event) -> None:
+        show(line, event)
+        if isinstance(event, PhotoAdded) and event.name == name:
+            act()
+
+    monkeypatch.setattr(ProgressLine, "show", show_and_act)
+
+
+def test_a_photo_that_is_deleted_before_it_is_read_is_named(five, tmp_path, monkeypatch, capsys):
+    after_photo(monkeypatch, "0001.jpg", (five / "0005.jpg").unlink)
+    assert reconstruct(five, tmp_path / "out", "--threads", "1") == 0
+    gone = "skipped 0005.jpg: unreadable: No such file or directory"
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if line.startswith("skipped ")] == [gone]
+    assert pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0").num_reg_images() == 4
+
+
+def test_a_folder_that_goes_away_leaves_what_was_read(five, tmp_path, monkeypatch, capsys):
+    """As a card that is pulled out."""
+    after_photo(monkeypatch, "0003.jpg", lambda: five.rename(tmp_path / "away"))
+    assert reconstruct(five, tmp_path / "out", "--threads", "1") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "skipped 0005.jpg: unreadable: No such file or directory" in lines
+    # The fourth may have been read already.
+    model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+    assert model.num_reg_images() in (3, 4)
 
 
 def test_a_closed_pipe_does_not_cost_the_models(five, tmp_path, monkeypatch):
