@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _EXIT_STATUS = """\
 exit status: 0 models were written, 1 there is no model, 2 a mistake in what was given. The first
 Ctrl-C, SIGTERM or SIGHUP finishes with the photos taken so far, with 0 or 1 as ever; a second one,
-or one before the first photo, leaves at once with 130.
+or one before the first photo, leaves at once: 130 for Ctrl-C, 143 for SIGTERM, 129 for SIGHUP.
 """
 _STOPPING = "stopping: finishing with the photos taken so far; once more leaves at once"
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from helpers.locations import ROOT
@@ -46,6 +47,13 @@ with leaving_at_signal(2, "stopping"):
     time.sleep(600)
 """
 
+BUSY = """
+from sfm_front.cli.signals import leaving_at_signal
+with leaving_at_signal(2, "stopping"):
+    print("ready", flush=True)
+    sum(range(10**14))
+"""
+
 
 def run(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
@@ -74,14 +82,41 @@ def test_while_modules_are_imported_a_signal_is_one_line(tmp_path, name, module)
     folder.mkdir()
     (folder / "a.jpg").touch()
     done = run(AT_IMPORT, name, module, str(folder), "--output", str(output))
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "\ninterrupted\n")
+    status = 128 + getattr(signal, name)
+    assert (done.returncode, done.stdout, done.stderr) == (status, "", "\ninterrupted\n")
     assert not output.exists()
 
 
-@pytest.mark.parametrize("second", SIGNALS)
-def test_the_second_ends_a_process_whose_main_thread_is_busy(second):
+@pytest.mark.parametrize("second", ["SIGTERM", "SIGHUP"])
+def test_the_second_ends_a_process_whose_main_thread_waits(second):
     done = run(WITHIN, "SIGINT", second)
-    assert (done.returncode, done.stderr) == (130, "\nstopping\n\ninterrupted\n")
+    status = 128 + getattr(signal, second)
+    assert (done.returncode, done.stderr) == (status, "\nstopping\n\ninterrupted\n")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it ends when the call returns")
+@pytest.mark.parametrize("name", SIGNALS)
+def test_the_second_ends_a_process_that_lets_no_python_run(name):
+    """As while COLMAP refines: a sum in C keeps the interpreter's lock all the time."""
+    with subprocess.Popen(
+        [sys.executable, "-c", BEGIN + BUSY],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout.readline() == "ready\n"
+        number = getattr(signal, name)
+        for _ in range(2):
+            process.send_signal(number)
+            while process.poll() is None and is_pending(process.pid, number):
+                pass
+        assert process.wait() == -number
+
+
+def is_pending(pid: int, number: int) -> bool:
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    masks = [int(line.split()[1], 16) for line in lines if line.startswith(("SigPnd", "ShdPnd"))]
+    return any(mask >> (number - 1) & 1 for mask in masks)
 
 
 @pytest.mark.parametrize("name", SIGNALS)
