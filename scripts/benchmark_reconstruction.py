@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from sfm_front.cli.streams import unfailing_streams
 from sfm_front.errors import ConfigError, InputError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.reconstruction.benchmark import OURS, Row, benchmark_scene
@@ -123,7 +124,8 @@ def check(args: argparse.Namespace, rivals: list[str], scenes: list[BenchmarkSce
 
 def main() -> int:
     try:
-        run(parse())
+        with unfailing_streams():
+            run(parse())
     except SfmFrontError as error:
         print(f"benchmark_reconstruction: {error}", file=sys.stderr)
         return 2

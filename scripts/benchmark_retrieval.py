@@ -17,6 +17,7 @@ import pycolmap
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from sfm_front.cli.streams import unfailing_streams
 from sfm_front.errors import ConfigError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.reconstruction.chart import check_matplotlib
@@ -142,7 +143,8 @@ def benchmark(args: argparse.Namespace) -> None:
 def main() -> int:
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # else one line per query
     try:
-        benchmark(parse())
+        with unfailing_streams():
+            benchmark(parse())
     except SfmFrontError as error:
         print(f"benchmark_retrieval: {error}", file=sys.stderr)
         return 2

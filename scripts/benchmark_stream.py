@@ -18,6 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from sfm_front.cli.streams import unfailing_streams
 from sfm_front.errors import ConfigError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
@@ -112,7 +113,8 @@ def _line(start: int, end: int, photos: Sequence[PhotoCost], amortized: float) -
 
 def main() -> int:
     try:
-        run(parse())
+        with unfailing_streams():
+            run(parse())
     except SfmFrontError as error:
         print(f"benchmark_stream: {error}", file=sys.stderr)
         return 2

@@ -7,7 +7,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from sfm_front.cli.main import main
+from sfm_front.cli import main
 
 if __name__ == "__main__":
     raise SystemExit(main(["view", *sys.argv[1:]]))

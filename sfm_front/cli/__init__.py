@@ -6,7 +6,11 @@ from collections.abc import Sequence
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run ``sfm-front``; see ``sfm_front.cli.main``."""
-    from sfm_front.cli.main import main as run
+    """Run ``sfm-front`` as a process of its own; see ``sfm_front.cli.main``."""
+    from sfm_front.cli.signals import leaving_at_signal
 
-    return run(argv)
+    # Before all other imports: Ctrl-C in the middle of one raises what nobody can foresee.
+    with leaving_at_signal(1):
+        from sfm_front.cli.main import main as run
+
+        return run(argv)

@@ -10,11 +10,26 @@ from collections.abc import Callable, Sequence
 from sfm_front import __version__
 from sfm_front.cli import explain, reconstruct, retrieve, view
 from sfm_front.cli.logs import add_logging, logging_to
+from sfm_front.cli.signals import INTERRUPTED
+from sfm_front.cli.streams import unfailing_streams
 from sfm_front.errors import SfmFrontError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; the exit status. Mistakes of the user end in one line and status 2."""
+    with unfailing_streams() as why_incomplete:
+        arguments = _parser().parse_args(argv)
+        status = _run(arguments)
+        lost = why_incomplete()
+        if lost is not None:
+            print(f"sfm-front: standard output is incomplete ({lost.strerror})", file=sys.stderr)
+            # What a reconstruction makes is in its folder; the others answer on standard output.
+            if arguments.command != "reconstruct":
+                status = status or 1
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="sfm-front", description="Structure-from-Motion that keeps up with the camera."
     )
@@ -24,7 +39,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     _add(commands, "retrieve", "folder and photo → its most relevant photos", retrieve)
     _add(commands, "view", "look at a sparse model", view)
     _add(commands, "explain", "why a photo was placed, or was not", explain)
-    arguments = parser.parse_args(argv)
+    return parser
+
+
+def _run(arguments: argparse.Namespace) -> int:
     run: Callable[[argparse.Namespace], int] = arguments.run
     # Pillow warns of damaged EXIF, line by line between the progress lines.
     warnings.filterwarnings("ignore", module=r"PIL\.")
@@ -36,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
 
 
 def _add(

@@ -65,9 +65,11 @@ class ProgressLine(LiveLine):
         else:
             return
         self._done += 1
+        # Nobody knows how many are still to come if a folder is watched.
+        of = f"/{self._total}  " if self._total else "  "
+        pace = f"  {_pace(self._started, self._done, self._total)}" if self._total else ""
         self._write(
-            f"photo {self._done}/{self._total}  registered {self._registered}  "
-            f"points {self._points}  {_pace(self._started, self._done, self._total)}"
+            f"photo {self._done}{of}registered {self._registered}  points {self._points}{pace}"
         )
 
     def finishing(self) -> None:

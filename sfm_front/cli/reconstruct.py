@@ -7,29 +7,36 @@ and it is placed in a model before the next one is taken.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from sfm_front.cli import arguments as shared
 from sfm_front.cli.progress import ProgressLine
-from sfm_front.errors import ConfigError
+from sfm_front.cli.signals import leaving_at_signal
+from sfm_front.errors import ConfigError, InputError
 from sfm_front.events import Listener
 from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.summary import closing_summary
 
 if TYPE_CHECKING:
     from sfm_front.session.options import SessionOptions
+    from sfm_front.types import NotYet, PhotoPath
+
+_EXIT_STATUS = """\
+exit status: 0 models were written, 1 there is no model, 2 a mistake in what was given. The first
+Ctrl-C, SIGTERM or SIGHUP finishes with the photos taken so far, with 0 or 1 as ever; a second one,
+or one before the first photo, leaves at once: 130 for Ctrl-C, 143 for SIGTERM, 129 for SIGHUP.
+"""
+_STOPPING = "stopping: finishing with the photos taken so far; once more leaves at once"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``reconstruct``. Defaults left out here are the session's."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = _EXIT_STATUS
     parser.set_defaults(usage_error=parser.error)
     parser.add_argument("folder", type=Path, nargs="?", help="photos, sub-folders included")
     parser.add_argument(
@@ -49,6 +56,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="add these photos to the reconstruction of another folder, given by --output",
     )
     parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="go on with photos that appear in the folder, until Ctrl-C or --idle-timeout",
+    )
+    parser.add_argument(
+        "--idle-timeout",
+        type=float,
+        metavar="SECONDS",
+        help="with --watch, finish when no photo has come for so long",
+    )
+    parser.add_argument(
+        "--snapshot-seconds",
+        type=float,
+        metavar="SECONDS",
+        help="age of the models in sparse/ while photos arrive (default: 30)",
+    )
+    parser.add_argument(
+        "--cache-mb",
+        type=int,
+        metavar="MB",
+        help="memory for features of earlier photos (default: a quarter of the machine's, 2048 "
+        "at most)",
+    )
+    parser.add_argument(
         "--events",
         choices=["-"],
         help="with -, print what happens as lines of JSON instead of the progress line",
@@ -56,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--text",
         action=argparse.BooleanOptionalAction,
-        help="whether to write models as text too",
+        help="whether to write models as text too; photo names must not hold spaces then",
     )
     parser.add_argument(
         "--config", type=Path, metavar="FILE", help="TOML of options; flags given here win over it"
@@ -106,45 +137,49 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.folder is None:
         arguments.usage_error("the following arguments are required: folder")
-    folder: Path = arguments.folder
-    output: Path = arguments.output or default_output(folder)
-    listed = list_photos(folder, exclude=output)
-    options = session_options(arguments)
-    photos = order_photos(listed, arguments.order, seed=options.seed)
-
     import pycolmap
 
-    from sfm_front.session.resume import named_in_session, nothing_to_do, outstanding
-    from sfm_front.session.session import Session
-
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
+    folder: Path = arguments.folder
+    output: Path = arguments.output or default_output(folder)
     overwrite, append = arguments.overwrite, arguments.append
-    if not overwrite and nothing_to_do(output, options, folder, photos, append=append):
-        print(f"{output}: finished, and holds all photos of {folder}: nothing to do")
-        return 0
-    progress = ProgressLine(sys.stderr if arguments.events else sys.stdout)
-    on_event = _event_printer() if arguments.events else progress.show
-    with (
-        Session(
+    # Once more: pycolmap has put a handler of its own for SIGTERM in place.
+    with leaving_at_signal(1):
+        from sfm_front.photos.watch import WatchOptions, watch_photos
+        from sfm_front.session.resume import Newcomers, nothing_to_do
+        from sfm_front.session.session import Session
+
+        options = session_options(arguments)
+        photos = [] if arguments.watch else _photos(arguments, output, options)
+        if not (arguments.watch or overwrite) and nothing_to_do(
+            output, options, folder, photos, append=append
+        ):
+            print(f"{output}: finished, and holds all photos of {folder}: nothing to do")
+            return 0
+        progress = ProgressLine(sys.stderr if arguments.events else sys.stdout)
+        on_event = _event_printer() if arguments.events else progress.show
+        session = Session(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
-        ) as session,
-        _interruptible() as interrupted,
-    ):
+        )
+    with session, leaving_at_signal(2, _STOPPING) as interrupted:
         for message in session.messages:
             progress.note(message)
-        named = named_in_session(session.database, folder, photos, output, append=append)
-        found = outstanding(session.database, named)
         if session.num_restored:
-            progress.note(
-                f"continuing {output}: {session.num_restored} photos are in it, "
-                f"{len(found.new)} are new"
+            progress.note(f"continuing {output}: {session.num_restored} photos are in it")
+        newcomers = Newcomers(session.database, folder, output, append=append)
+        arriving: Iterable[PhotoPath | NotYet]
+        if arguments.watch:
+            watch = WatchOptions(idle_timeout_s=arguments.idle_timeout)
+            appearing = watch_photos(
+                folder, watch, exclude=output, stop=interrupted, note=progress.note
             )
-        for name in found.changed:
-            progress.note(f"{name}: has changed since it was taken in; the old one stays")
-        progress.expect(len(found.new))
-        for _ in session.add_all(found.new):
+            arriving = newcomers.among(appearing, progress.note)
+        else:
+            new = list(newcomers.among(photos, progress.note))
+            progress.expect(len(new))
+            arriving = new
+        for _ in session.add_all(arriving):
             if interrupted():
-                progress.note("stopping: finishing with the photos taken so far")
                 break
         progress.finishing()
         result = session.finish()
@@ -159,6 +194,20 @@ def _event_printer() -> Listener:
     return EventLog(sys.stdout).write
 
 
+def _photos(
+    arguments: argparse.Namespace, output: Path, options: SessionOptions
+) -> list[PhotoPath]:
+    from sfm_front.exporters.colmap import first_name_lost_in_text
+
+    listed = list_photos(arguments.folder, exclude=output)
+    if options.text and (lost := first_name_lost_in_text(photo.name for photo in listed)):
+        raise InputError(
+            f"{lost!r}: COLMAP's text format would cut this name at its white space. "
+            "Rename the photo, or leave --text out."
+        )
+    return order_photos(listed, arguments.order, seed=options.seed)
+
+
 def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("give a folder, or leave --output out")
@@ -167,7 +216,10 @@ def _folder(text: str) -> Path:
 
 def default_output(folder: Path) -> Path:
     """``outputs/NAME`` below the working folder."""
-    resolved = folder.resolve()
+    try:
+        resolved = folder.resolve()
+    except (OSError, RuntimeError):  # Links in a circle, no working folder: listing will say so.
+        resolved = folder
     named = resolved.parent if resolved.name.lower() == "images" else resolved
     return Path("outputs") / (named.name or "photos")
 
@@ -183,8 +235,9 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
         given["pair_matching"] = replace(base.pair_matching, num_matched=arguments.num_matched)
     if arguments.text is not None:
         given["text"] = arguments.text
-    if arguments.seed is not None:
-        given["seed"] = arguments.seed
+    for name in ("seed", "snapshot_seconds", "cache_mb"):
+        if getattr(arguments, name) is not None:
+            given[name] = getattr(arguments, name)
     cameras = {
         "mode": arguments.camera_mode,
         "model": arguments.camera_model,
@@ -205,21 +258,3 @@ def _numbers(text: str | None) -> tuple[float, ...] | None:
         raise ConfigError(
             f"--camera-params takes numbers separated by commas, got {text!r}"
         ) from None
-
-
-@contextmanager
-def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Let the first Ctrl-C ask the loop to stop between two photos; the second one interrupts."""
-    asked = False
-
-    def ask(_number: int, _frame: FrameType | None) -> None:
-        nonlocal asked
-        if asked:
-            raise KeyboardInterrupt
-        asked = True
-
-    before = signal.signal(signal.SIGINT, ask)
-    try:
-        yield lambda: asked
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
+import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,15 @@ STATE = "session.json"
 
 # Free space from which a model is taken to be whole without reading it back.
 _ROOM = 64 * 2**20
+logger = logging.getLogger(__name__)
+
+# What C++ takes for white space: COLMAP reads a name in a text model up to the first of it.
+_WHITE_SPACE = re.compile(r"[ \t\n\v\f\r]")
+
+
+def first_name_lost_in_text(names: Iterable[str]) -> str | None:
+    """The first photo name that COLMAP's text form cannot keep; None if it keeps them all."""
+    return next((name for name in names if _WHITE_SPACE.search(name)), None)
 
 
 def export_models(
@@ -35,7 +46,8 @@ def export_models(
     """Colour models and write them to ``folder/0``, ``folder/1``, … in the order given.
 
     ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form,
-    ``point_clouds`` PLY files, ``state`` a JSON file with this content beside the models.
+    ``point_clouds`` PLY files, ``state`` a JSON file with this content beside the models. A model
+    with a photo whose name text cannot keep gets none: a warning names the photo.
     Everything is written beside ``folder`` first, synced, and then moved into place, so that a
     crash leaves either the models that were there or the new ones, never a part. If it happens
     between the two moves, ``recover_models`` completes them. Raises StorageError if the disk is
@@ -78,7 +90,7 @@ def _export(
         model.mkdir()
         reconstruction.write_binary(model)
         if text:
-            reconstruction.write_text(model)
+            _write_text(reconstruction, model)
         if point_clouds:
             reconstruction.export_PLY(model / "points3D.ply")
         _check_written(reconstruction, model)
@@ -122,6 +134,14 @@ def _sync_all(folder: Path) -> None:
     for path in folder.rglob("*"):
         sync(path)
     sync(folder)
+
+
+def _write_text(reconstruction: pycolmap.Reconstruction, folder: Path) -> None:
+    lost = first_name_lost_in_text(image.name for image in reconstruction.images.values())
+    if lost is None:
+        reconstruction.write_text(folder)
+    else:
+        logger.warning("no model as text: COLMAP would cut the name %r at its white space", lost)
 
 
 def _replace(folder: Path) -> None:

@@ -162,6 +162,16 @@ class Atlas:
         self.drop_covered()
         return grew
 
+    def settle(self) -> None:
+        """Refine and grow in turn until nothing more registers, failures retried."""
+        for model in self.models:
+            model.refine()
+            model.forget_failures()
+        while self.grow():
+            for model in self.models:
+                model.refine()
+                model.forget_failures()
+
     def candidates_of(self, model: Model) -> list[int]:
         """Photos that a model may register; for the largest, those of smaller models too."""
         if model is self.models[0]:

@@ -122,13 +122,10 @@ class Initializer:
         for number, level in enumerate(options.constraint_levels):
             if not last_call and not _allowed(level, len(group)):
                 break
-            min_angle_deg = options.angle_tolerance * level.constraints.min_angle_deg
             for pair in self._view_graph.pairs(group):
                 if (*pair, number) in self._tried:
                     continue
-                # Known from verification, with the focal length's error in it, or not at all.
-                angle_deg = self._view_graph.angle_deg(pair)
-                if angle_deg is not None and angle_deg < min_angle_deg:
+                if self._is_too_narrow(pair, level):
                     continue
                 if trials == 0:
                     return None
@@ -144,6 +141,9 @@ class Initializer:
         for level in self._options.constraint_levels:
             if level.min_waiting is None:
                 break
+            pairs = self._view_graph.pairs(self._view_graph.image_ids)
+            if all(self._is_too_narrow(pair, level) for pair in pairs):
+                continue  # COLMAP would estimate every one of them to find none.
             finder = Model(self._view_graph, self._mapper_options)
             for _ in range(per_level):
                 pair = finder.find_initial_pair(level.constraints)
@@ -152,6 +152,15 @@ class Initializer:
                 model = self._start_from(pair, level.constraints, StartKind.RESTART)
                 if model is not None:
                     yield model
+
+    def _is_too_narrow(self, pair: tuple[int, int], level: ConstraintLevel) -> bool:
+        """Whether the angle, if known from verification, is far below what the level asks for.
+
+        It has the error of the focal length in it.
+        """
+        angle_deg = self._view_graph.angle_deg(pair)
+        least_deg = self._options.angle_tolerance * level.constraints.min_angle_deg
+        return angle_deg is not None and angle_deg < least_deg
 
     def _start_from(
         self, pair: tuple[int, int], constraints: InitialPairConstraints, kind: StartKind

@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from PIL.Image import Image
 
 from sfm_front.photos.formats import format_of
+from sfm_front.photos.time_limit import READ_TIMEOUT_S, read_within
 from sfm_front.types import Exif, GeoPosition
 
 FULL_FRAME_DIAGONAL_MM = 43.27
@@ -24,14 +25,17 @@ _PLAUSIBLE_SENSOR_DIAGONAL_MM = (1.0, 100.0)
 def read_exif(path: Path) -> Exif:
     """EXIF of a file, without decoding its pixels; an empty Exif if it cannot be read."""
     try:
-        with path.open("rb") as file:
-            image_format = format_of(file.read(16))
-            if image_format is None:
-                return Exif()
-            file.seek(0)
-            return exif_of(image_format.open(file))
-    except Exception:  # Broken headers raise anything; PhotoReader reports the reason.
+        return read_within(READ_TIMEOUT_S, path, _exif_of_file)
+    except Exception:  # Broken headers raise anything; PhotoReader will give the reason.
         return Exif()
+
+
+def _exif_of_file(file: BinaryIO) -> Exif:
+    image_format = format_of(file.read(16))
+    if image_format is None:
+        return Exif()
+    file.seek(0)
+    return exif_of(image_format.open(file))
 
 
 def exif_of(image: Image) -> Exif:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 
 from sfm_front.errors import ConfigError
 from sfm_front.photos.decoding import Undecodable, decode
+from sfm_front.photos.time_limit import READ_TIMEOUT_S, read_within
 from sfm_front.types import Photo, Skipped, SkipReason
 
 
@@ -18,11 +18,13 @@ class PhotoReader:
 
     ``max_image_size``: the long side of a photo's pixels is reduced to this, never enlarged.
     ``min_image_size``: files whose short side is below this are skipped. Both in pixels.
+    ``timeout_s``: files that take longer to read, decoding apart, are skipped.
     Stateless and thread-safe.
     """
 
     max_image_size: int = 1600
     min_image_size: int = 64
+    timeout_s: float = READ_TIMEOUT_S
 
     def __post_init__(self) -> None:
         if self.min_image_size < 1:
@@ -32,10 +34,12 @@ class PhotoReader:
                 f"max_image_size must be at least min_image_size ({self.min_image_size}), "
                 f"got {self.max_image_size}"
             )
+        if not self.timeout_s > 0:
+            raise ConfigError(f"timeout_s must be above 0, got {self.timeout_s}")
 
     def read(self, path: Path, name: str) -> Photo | Skipped:
         """Read the photo at ``path`` under the name ``name``. Never raises, whatever the file."""
-        data = _content(path, name)
+        data = _content(path, name, self.timeout_s)
         if isinstance(data, Skipped):
             return data
         decoded = decode(data, self.max_image_size)
@@ -61,16 +65,13 @@ class PhotoReader:
 
 def file_digest(path: Path, name: str) -> str | Skipped:
     """The ``digest`` of a ``Photo`` of this file, decodable or not. Never raises."""
-    data = _content(path, name)
+    data = _content(path, name, READ_TIMEOUT_S)
     return data if isinstance(data, Skipped) else _digest(data)
 
 
-def _content(path: Path, name: str) -> bytes | Skipped:
+def _content(path: Path, name: str, timeout_s: float) -> bytes | Skipped:
     try:
-        # Opening a pipe could block for ever, so anything but a regular file is refused first.
-        if not stat.S_ISREG(path.stat().st_mode):
-            return Skipped(name, SkipReason.UNREADABLE, "not a regular file")
-        return path.read_bytes()
+        return read_within(timeout_s, path, lambda file: file.read())
     except (OSError, ValueError, MemoryError) as error:
         detail = getattr(error, "strerror", None) or str(error) or type(error).__name__
         return Skipped(name, SkipReason.UNREADABLE, detail)

@@ -44,6 +44,12 @@ def closing_summary(summary: RunSummary, output: Path) -> str:
 def _advice(summary: RunSummary) -> str:
     if not summary.used:
         return "no model could be built: no photo could be read"
+    # Each but the first can have pairs with earlier photos.
+    if 2 * sum(photo.num_verified > 0 for photo in summary.used) >= len(summary.used):
+        return (
+            "no model could be built: the photos overlap, but the camera hardly moved between "
+            "them. Take each from another place; turning on the spot shows no depth"
+        )
     return (
         "no model could be built: take photos that overlap by two thirds and more, "
         "from different places"

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from sfm_front.errors import InputError
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import DATABASE, check_output_folder, holds_session
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.storage.session_lock import SessionLock
-from sfm_front.types import FileState, PhotoPath
+from sfm_front.types import FileState, NotYet, PhotoPath
 
 _OPTIONS = "options"
 _STATE = "state"
@@ -109,35 +109,59 @@ def _free_prefix(
     )
 
 
-@dataclass(frozen=True)
-class Outstanding:
-    """What of a list of photos a session has not seen yet."""
+class Newcomers:
+    """Which photos of a folder a session has not seen, under their names in it."""
 
-    new: list[PhotoPath]
-    # Seen under this name, with other content since.
-    changed: list[str]
-    num_known: int
+    def __init__(
+        self, database: PhotoDatabase, folder: Path, output: Path, *, append: bool
+    ) -> None:
+        """``append``: whether photos of another folder may be added."""
+        self._database = database
+        self._folder = folder
+        self._output = output
+        self._append = append
+        self._used = {photo.name: photo.file for photo in database.photos()}
+        self._skipped = {photo.name: file for photo, file in database.skipped()}
 
+    @overload
+    def among(
+        self, photos: Sequence[PhotoPath], note: Callable[[str], None]
+    ) -> Iterator[PhotoPath]: ...
+    @overload
+    def among(
+        self, photos: Iterable[PhotoPath | NotYet], note: Callable[[str], None]
+    ) -> Iterator[PhotoPath | NotYet]: ...
+    def among(
+        self, photos: Iterable[PhotoPath | NotYet], note: Callable[[str], None]
+    ) -> Iterator[PhotoPath | NotYet]:
+        """New photos, in their order. A file that was skipped and has changed since is new; one
+        that was used and has changed stays as it was, and is told to ``note``.
 
-def outstanding(database: PhotoDatabase, photos: Iterable[PhotoPath]) -> Outstanding:
-    """Sort photos by whether they are in the database, as used or as skipped.
+        Raises InputError if the session is over another folder and ``append`` is not wanted.
+        """
+        if isinstance(photos, Sequence):
+            photos = self._named(photos)
+        for photo in photos:
+            if isinstance(photo, NotYet):
+                yield photo
+                continue
+            if not isinstance(photos, Sequence):
+                (photo,) = self._named([photo])
+            if self._is_new(photo, note):
+                yield photo
 
-    A file that was skipped and has changed since is new.
-    """
-    used = {photo.name: photo.file for photo in database.photos()}
-    skipped = {photo.name: file for photo, file in database.skipped()}
-    new, changed, num_known = [], [], 0
-    for photo in photos:
+    def _named(self, photos: Sequence[PhotoPath]) -> list[PhotoPath]:
+        return named_in_session(
+            self._database, self._folder, photos, self._output, append=self._append
+        )
+
+    def _is_new(self, photo: PhotoPath, note: Callable[[str], None]) -> bool:
         now = FileState.of(photo.path)
-        if photo.name in used:
-            num_known += 1
-            if not _same(used[photo.name], now):
-                changed.append(photo.name)
-        elif photo.name in skipped and _same(skipped[photo.name], now):
-            num_known += 1
-        else:
-            new.append(photo)
-    return Outstanding(new, changed, num_known)
+        if photo.name in self._used:
+            if not _same(self._used[photo.name], now):
+                note(f"{photo.name}: has changed since it was taken in; the old one stays")
+            return False
+        return photo.name not in self._skipped or not _same(self._skipped[photo.name], now)
 
 
 def nothing_to_do(
@@ -158,8 +182,8 @@ def nothing_to_do(
     with SessionLock(output), PhotoDatabase(output / DATABASE) as database:
         if not check_options(database, options, output) or not is_finished(database):
             return False
-        named = named_in_session(database, folder, photos, output, append=append)
-        return not outstanding(database, named).new
+        newcomers = Newcomers(database, folder, output, append=append)
+        return next(newcomers.among(photos, lambda _: None), None) is None
 
 
 def _same(before: FileState, now: FileState) -> bool:

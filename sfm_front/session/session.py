@@ -51,6 +51,7 @@ from sfm_front.types import (
     CandidateOutcome,
     ExtractedPhoto,
     ModelSummary,
+    NotYet,
     PairGeometry,
     PhotoPath,
     RankedCandidate,
@@ -58,6 +59,9 @@ from sfm_front.types import (
     Skipped,
 )
 from sfm_front.version import VERSION
+
+# Photos that follow each other faster than this must not wait for a refinement.
+_IDLE_AFTER_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +117,8 @@ class Session(Closeable):
         )
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         self._finished = False
+        # Whether the time has been used since the last photo.
+        self._is_idle = True
         self._announcer = Announcer([] if on_event is None else [on_event])
         # What is open is closed again if a later part cannot be made.
         with ExitStack() as opened:
@@ -200,10 +206,30 @@ class Session(Closeable):
         photo = self._announcer.arrive(PhotoPath(name or path.name, path))
         return self.add_extracted(self._extraction.describe(photo))
 
-    def add_all(self, photos: Iterable[PhotoPath]) -> Iterator[PhotoAdded | Skipped]:
-        """Take in photos in order; the next ones are described while one is matched and mapped."""
-        for extracted in self._extraction.stream(map(self._announcer.arrive, photos)):
-            yield self.add_extracted(extracted)
+    def add_all(self, photos: Iterable[PhotoPath | NotYet]) -> Iterator[PhotoAdded | Skipped]:
+        """Take in photos in order; the next ones are described while one is matched and mapped.
+
+        ``NotYet`` among them, as ``photos.watch`` gives it, lets the session use the time.
+        """
+        for extracted in self._extraction.stream(map(self._arrive, photos)):
+            if isinstance(extracted, NotYet):
+                self.idle(extracted.seconds)
+            else:
+                yield self.add_extracted(extracted)
+
+    def idle(self, seconds: float) -> None:
+        """Nothing has arrived for ``seconds``: retry photos that wait, and refine, once."""
+        if self._is_idle or seconds < _IDLE_AFTER_S:
+            return
+        self._is_idle = True
+        before = self._atlas.registered
+        self._atlas.settle()
+        for image_id in sorted(self._atlas.registered - before):
+            self._announcer.tell_placed(self._atlas, image_id)
+        self._snapshots.write(self._atlas.models, len(self._catalog), self._catalog.colors)
+
+    def _arrive(self, photo: PhotoPath | NotYet) -> PhotoPath | NotYet:
+        return photo if isinstance(photo, NotYet) else self._announcer.arrive(photo)
 
     def add_extracted(self, photo: ExtractedPhoto | Skipped) -> PhotoAdded | Skipped:
         """Take in a photo whose features are extracted already.
@@ -213,6 +239,7 @@ class Session(Closeable):
         """
         if self._finished:
             raise RuntimeError("the session is finished: begin another one for more photos")
+        self._is_idle = False
         added = photo if isinstance(photo, Skipped) else self._add(photo)
         self._report.add(added)
         if isinstance(added, Skipped):

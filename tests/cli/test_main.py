@@ -131,6 +131,12 @@ def test_a_folder_that_is_missing(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_folder_that_is_a_link_to_itself(tmp_path, capsys):
+    (tmp_path / "loop").symlink_to("loop")
+    line = refused(capsys, "reconstruct", tmp_path / "loop")
+    assert "loop: cannot be read (" in line
+
+
 def test_a_folder_without_photos(tmp_path, capsys):
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty" / "notes.txt").write_text("no photo")
@@ -169,6 +175,13 @@ def test_options_that_cannot_be(photo, tmp_path, capsys, given, message):
     line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out", *given)
     assert message in line
     assert line.startswith("sfm-front reconstruct: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_names_that_text_models_would_cut(photo, tmp_path, capsys):
+    (photo / "a.png").rename(photo / "a b.png")
+    line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out", "--text")
+    assert "'a b.png'" in line
     assert not (tmp_path / "out").exists()
 
 

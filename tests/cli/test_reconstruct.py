@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import shutil
 import signal
 import sqlite3
 import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +19,7 @@ import pycolmap
 import pytest
 from helpers.locations import VILLAGE
 from helpers.model_building import make_model
+from helpers.signal_handlers import default_handlers
 from PIL import Image
 
 from sfm_front.cli.main import main
@@ -164,8 +167,14 @@ def five(tmp_path) -> Path:
     return folder
 
 
-def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int) -> None:
-    """Send Ctrl-C when this many photos have been added."""
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    with default_handlers():
+        yield
+
+
+def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int, number: int) -> None:
+    """Send a signal when this many photos have been added."""
     show = ProgressLine.show
     shown = []
 
@@ -174,29 +183,74 @@ def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int) -> None:
         if isinstance(event, PhotoAdded):
             shown.append(event)
             if len(shown) == photos:
-                signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(number)
 
     monkeypatch.setattr(ProgressLine, "show", show_and_interrupt)
 
 
-def test_ctrl_c_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypatch, capsys):
-    interrupt_after(monkeypatch, 4)
-    handler = signal.getsignal(signal.SIGINT)
+@pytest.mark.usefixtures("handlers")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypatch, capfd, number):
+    interrupt_after(monkeypatch, 4, number)
+    handler = signal.getsignal(number)
     assert reconstruct(five, tmp_path / "out") == 0
-    assert "stopping: finishing with the photos taken so far" in capsys.readouterr().out
+    assert "stopping: finishing with the photos taken so far" in capfd.readouterr().err
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 5)]
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
     assert model.num_reg_images() == report["totals"]["registered"] >= 3
-    assert signal.getsignal(signal.SIGINT) is handler
+    assert signal.getsignal(number) is handler
 
 
+@pytest.mark.usefixtures("handlers")
 def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch, capsys):
-    interrupt_after(monkeypatch, 1)
+    interrupt_after(monkeypatch, 1, signal.SIGINT)
     assert reconstruct(five, tmp_path / "out") == 1
     assert "no model could be built" in capsys.readouterr().out
     assert [path.name for path in (tmp_path / "out" / "sparse").iterdir()] == ["session.json"]
     assert (tmp_path / "out" / "report.json").exists()
+
+
+def after_photo(monkeypatch: pytest.MonkeyPatch, name: str, act: Callable[[], object]) -> None:
+    """Do something when this photo has been added; on one thread, the next is being read then."""
+    show = ProgressLine.show
+
+    def show_and_act(line: ProgressLine, event: Event) -> None:
+        show(line, event)
+        if isinstance(event, PhotoAdded) and event.name == name:
+            act()
+
+    monkeypatch.setattr(ProgressLine, "show", show_and_act)
+
+
+def test_a_photo_that_is_deleted_before_it_is_read_is_named(five, tmp_path, monkeypatch, capsys):
+    after_photo(monkeypatch, "0001.jpg", (five / "0005.jpg").unlink)
+    assert reconstruct(five, tmp_path / "out", "--threads", "1") == 0
+    gone = "skipped 0005.jpg: unreadable: No such file or directory"
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if line.startswith("skipped ")] == [gone]
+    assert pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0").num_reg_images() == 4
+
+
+def test_a_folder_that_goes_away_leaves_what_was_read(five, tmp_path, monkeypatch, capsys):
+    """As a card that is pulled out."""
+    after_photo(monkeypatch, "0003.jpg", lambda: five.rename(tmp_path / "away"))
+    assert reconstruct(five, tmp_path / "out", "--threads", "1") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "skipped 0005.jpg: unreadable: No such file or directory" in lines
+    # The fourth may have been read already.
+    model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+    assert model.num_reg_images() in (3, 4)
+
+
+def test_a_closed_pipe_does_not_cost_the_models(five, tmp_path, monkeypatch):
+    """As with ``| head -1``."""
+    receiver, sender = os.pipe()
+    os.close(receiver)
+    with os.fdopen(sender, "w") as pipe:
+        monkeypatch.setattr(sys, "stdout", pipe)
+        assert reconstruct(five, tmp_path / "out") == 0
+    assert pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0").num_reg_images() == 5
 
 
 def test_one_thread_and_a_seed_repeat_to_the_bit(five, tmp_path):

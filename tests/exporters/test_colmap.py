@@ -13,7 +13,11 @@ from helpers.photo_stream import centre_of, true_matches
 from sfm_front.errors import StorageError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.exporters import colmap
-from sfm_front.exporters.colmap import export_models, recover_models
+from sfm_front.exporters.colmap import (
+    export_models,
+    first_name_lost_in_text,
+    recover_models,
+)
 
 BINARY = {"cameras.bin", "frames.bin", "images.bin", "points3D.bin", "rigs.bin", "points3D.ply"}
 TEXT = {"cameras.txt", "frames.txt", "images.txt", "points3D.txt", "rigs.txt"}
@@ -104,6 +108,38 @@ def test_the_point_cloud_has_the_models_points_and_colours(orbit, tmp_path):
 def test_text_is_added_when_asked_for(orbit, tmp_path):
     export_models([make_model(orbit, 2)], colors_of(orbit, 2), tmp_path / "sparse", text=True)
     assert {path.name for path in (tmp_path / "sparse" / "0").iterdir()} == BINARY | TEXT
+
+
+def renamed(model: pycolmap.Reconstruction, name: str) -> pycolmap.Reconstruction:
+    model.images[1].name = name
+    return model
+
+
+ODD = ("a b.jpg", " a.jpg", "a.jpg ", "a\tb.jpg", "a\nb.jpg", "a\vb.jpg", "a\fb.jpg", "a\rb.jpg")
+KEPT = ("#a.jpg", "a,b.jpg", 'a"b.jpg', "süd/写真.jpg", "a\u00a0b.jpg", "a\u2028b.jpg", "\\xe4.jpg")
+
+
+@pytest.mark.parametrize("name", [*ODD, *KEPT])
+def test_the_names_said_to_be_lost_in_text_are_those_that_are(orbit, tmp_path, name):
+    model = renamed(make_model(orbit, 2), name)
+    model.write_text(tmp_path)
+    read = pycolmap.Reconstruction()
+    try:
+        read.read_text(tmp_path)
+        kept = read.images[1].name == name
+    except (ValueError, IndexError):
+        kept = False
+    assert kept == (first_name_lost_in_text(["b.jpg", name]) is None) == (name in KEPT)
+
+
+def test_a_model_whose_names_text_would_cut_has_no_text(orbit, tmp_path, caplog):
+    models = [renamed(make_model(orbit, 3), "a b.jpg"), make_model(orbit, 2)]
+    export_models(models, colors_of(orbit, 3), tmp_path / "sparse", text=True)
+    written = [{path.name for path in (tmp_path / "sparse" / n).iterdir()} for n in "01"]
+    assert written == [BINARY, BINARY | TEXT]
+    assert pycolmap.Reconstruction(tmp_path / "sparse" / "0").images[1].name == "a b.jpg"
+    (message,) = caplog.messages
+    assert "'a b.jpg'" in message
 
 
 def test_no_models_leave_an_empty_folder(tmp_path):

@@ -252,6 +252,20 @@ def test_an_atlas_without_photos_or_matches_ends_without_models():
     assert alone.why_not_registered(1) == "no verified matches with any photo"
 
 
+def test_a_camera_that_did_not_move_is_not_searched_for_a_start(orbit, monkeypatch):
+    """COLMAP would estimate every pair anew at every level."""
+
+    def search(*_: object) -> None:
+        raise AssertionError("searched")
+
+    monkeypatch.setattr(Model, "find_initial_pair", search)
+    monkeypatch.setattr(ViewGraph, "angle_deg", lambda *_: 0.2)
+    atlas = run(SceneFeed(orbit), range(8))
+    finish(atlas)
+    assert atlas.models == []
+    assert atlas.waiting == list(range(1, 9))
+
+
 def test_the_cost_of_global_refinement_stays_amortised(orbit, monkeypatch):
     """Sizes at which the growing model was refined as a whole, against the geometric series."""
     from sfm_front.mapping import model as mapper

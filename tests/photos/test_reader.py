@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import stat
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,8 +13,9 @@ from PIL import Image
 
 from sfm_front.errors import ConfigError
 from sfm_front.photos.duplicates import DuplicateFinder
+from sfm_front.photos.exif import read_exif
 from sfm_front.photos.reader import PhotoReader, file_digest
-from sfm_front.types import Photo, Skipped, SkipReason
+from sfm_front.types import Exif, Photo, Skipped, SkipReason
 
 
 def make_missing(path: Path) -> None:
@@ -72,11 +74,44 @@ def test_what_cannot_be_read_is_unreadable(
 ) -> None:
     (tmp_path / "x.jpg").write_bytes(b"x")
 
-    def refuse(_path: Path) -> bytes:
+    def refuse(_path: Path, _mode: str) -> None:
         raise error
 
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     assert look(tmp_path / "x.jpg", "x.jpg") == Skipped("x.jpg", SkipReason.UNREADABLE, detail)
+
+
+@pytest.fixture
+def hanging(tmp_path: Path) -> Iterator[Path]:
+    """A file that gives nothing until the test is over, to whom stat says that it is regular."""
+    path = tmp_path / "x.jpg"
+    os.mkfifo(path)
+    is_regular = stat.S_ISREG
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stat, "S_ISREG", lambda mode: stat.S_ISFIFO(mode) or is_regular(mode))
+        yield path
+    os.close(os.open(path, os.O_RDWR))  # Lets the reader that waits go on.
+
+
+def test_a_file_that_hangs_is_given_up(hanging: Path) -> None:
+    assert PhotoReader(timeout_s=0.01).read(hanging, "x.jpg") == Skipped(
+        "x.jpg", SkipReason.UNREADABLE, "no answer within 0.01 s"
+    )
+
+
+def test_a_pipe_behind_a_link_is_no_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "x.jpg").symlink_to("pipe")
+    assert PhotoReader().read(tmp_path / "x.jpg", "x.jpg") == Skipped(
+        "x.jpg", SkipReason.UNREADABLE, "not a regular file"
+    )
+    assert read_exif(tmp_path / "x.jpg") == Exif()
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, float("nan")])
+def test_a_time_limit_that_cannot_be_is_refused(timeout_s: float) -> None:
+    with pytest.raises(ConfigError, match="timeout_s must be above 0"):
+        PhotoReader(timeout_s=timeout_s)
 
 
 @looks

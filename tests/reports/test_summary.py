@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from sfm_front.reports.run_summary import ModelOutcome, Outcome, PhotoOutcome, RunSummary, Totals
 from sfm_front.reports.summary import closing_summary
 from sfm_front.types import Skipped, SkipReason
@@ -80,3 +82,19 @@ def test_without_a_model_it_says_what_to_do():
 def test_where_nothing_could_be_read_more_overlap_is_no_advice():
     text = closing_summary(summary([Skipped("a.jpg", SkipReason.TRUNCATED)], 0), Path("out"))
     assert text.splitlines()[-1] == "no model could be built: no photo could be read"
+
+
+@pytest.mark.parametrize(
+    ("num_verified", "advice"),
+    [
+        ([0, 1, 2, 2], "the camera hardly moved"),
+        ([0, 1], "the camera hardly moved"),
+        ([0, 1, 0, 0], "overlap by two thirds"),
+        ([0, 0], "overlap by two thirds"),
+        ([0], "overlap by two thirds"),
+    ],
+)
+def test_where_photos_overlap_but_give_no_model_the_camera_did_not_move(num_verified, advice):
+    photos = [replace(waiting(f"{i}.jpg", "…"), num_verified=n) for i, n in enumerate(num_verified)]
+    text = closing_summary(summary(photos, 0), Path("out"))
+    assert advice in text.splitlines()[-1]

@@ -21,10 +21,10 @@ from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import Event, ModelStarted, PhotoAdded, SessionStarted
 from sfm_front.session import snapshots
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.resume import is_finished, named_in_session, outstanding
+from sfm_front.session.resume import Newcomers, is_finished, named_in_session
 from sfm_front.session.session import Session, SessionResult
 from sfm_front.storage.database import PhotoDatabase
-from sfm_front.types import ExtractedPhoto, PhotoPath, Skipped, SkipReason
+from sfm_front.types import ExtractedPhoto, NotYet, PhotoPath, Skipped, SkipReason
 
 NUM_PHOTOS = 12
 POSITION_TOLERANCE_M = 0.3
@@ -232,18 +232,29 @@ def database(orbit, folder, tmp_path):
         yield database
 
 
-def test_what_is_known_is_not_outstanding(database, folder):
-    found = outstanding(database, folder)
-    assert ([photo.name for photo in found.new], found.changed) == (["c.jpg"], [])
-    assert found.num_known == 2
+def new_among(database: PhotoDatabase, photos: list[PhotoPath]) -> tuple[list[str], list[str]]:
+    """Names of those that are new, asked for one by one, too; and what is told."""
+    told: list[str] = []
+    newcomers = Newcomers(database, photos[0].path.parent, Path("out"), append=False)
+    new = [photo.name for photo in newcomers.among(photos, told.append)]
+    one_by_one = newcomers.among(iter([NotYet(0.0), *photos]), lambda _: None)
+    assert next(one_by_one) == NotYet(0.0)
+    assert [photo.name for photo in one_by_one] == new
+    return new, told
+
+
+def test_what_is_known_is_not_new(database, folder):
+    database.remember("sources", json.dumps({str(folder[0].path.parent.resolve()): ""}))
+    assert new_among(database, folder) == (["c.jpg"], [])
 
 
 def test_a_used_photo_that_changed_is_told_and_a_skipped_one_is_tried_again(database, folder):
+    database.remember("sources", json.dumps({str(folder[0].path.parent.resolve()): ""}))
     for photo in folder[:2]:
         photo.path.write_bytes(b"another photo")
-    found = outstanding(database, folder)
-    assert [photo.name for photo in found.new] == ["b.jpg", "c.jpg"]
-    assert found.changed == ["a.jpg"]
+    new, (told,) = new_among(database, folder)
+    assert new == ["b.jpg", "c.jpg"]
+    assert told == "a.jpg: has changed since it was taken in; the old one stays"
 
 
 def test_another_folder_is_added_only_when_wanted(database, folder, tmp_path):
