@@ -76,8 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--cache-mb",
         type=int,
         metavar="MB",
-        help="memory for features of earlier photos (default: a quarter of the machine's, 2048 "
-        "at most)",
+        help="memory for features of earlier photos (default: a quarter of the machine's memory, "
+        "at most 2048)",
     )
     parser.add_argument(
         "--events",

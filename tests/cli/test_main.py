@@ -77,6 +77,8 @@ DEFAULTS_OF = {
         "--camera-mode": SESSION.cameras.mode,
         "--camera-model": SESSION.cameras.model,
         "--num-matched": SESSION.pair_matching.num_matched,
+        "--snapshot-seconds": f"{SESSION.snapshot_seconds:g}",
+        "--cache-mb": "a quarter of the machine's memory, at most 2048",
     },
     retrieve: DEFAULTS | {"--method": SearchOptions().method},
 }

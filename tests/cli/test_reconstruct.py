@@ -326,7 +326,7 @@ def test_the_same_command_again_has_nothing_to_do(five, tmp_path, capsys):
 def test_an_interrupted_run_is_continued_by_the_same_command(five, tmp_path, monkeypatch, capsys):
     output = tmp_path / "out"
     with monkeypatch.context() as patched:
-        interrupt_after(patched, 2)
+        interrupt_after(patched, 2, signal.SIGINT)
         reconstruct(five, output)
     capsys.readouterr()
     assert reconstruct(five, output) == 0
