@@ -26,6 +26,7 @@ class RunReport:
     def __init__(self) -> None:
         self._started = time.perf_counter()
         self._photos: list[Skipped | PhotoAdded] = []
+        self._restored: set[int] = set()
 
     def add(self, photo: Skipped | PhotoAdded) -> None:
         """Note a photo."""
@@ -33,6 +34,7 @@ class RunReport:
 
     def restore(self, photo: StoredPhoto) -> None:
         """Note a photo of an earlier run; what its mapping took is not known any more."""
+        self._restored.add(photo.image_id)
         self._photos.append(
             PhotoAdded(
                 photo.name,
@@ -95,7 +97,9 @@ class RunReport:
             mean_reprojection_error_px=error / points if points else None,
             wall_seconds=time.perf_counter() - self._started,
             seconds_by_stage=dict(by_stage),
-            median_seconds_by_quarter=_median_seconds_by_quarter(used),
+            median_seconds_by_quarter=_median_seconds_by_quarter(
+                [photo for photo in used if photo.image_id not in self._restored]
+            ),
             peak_memory_bytes=_peak_memory_bytes(),
         )
 

@@ -330,7 +330,9 @@ def test_an_interrupted_run_is_continued_by_the_same_command(five, tmp_path, mon
         reconstruct(five, output)
     capsys.readouterr()
     assert reconstruct(five, output) == 0
-    assert "2 photos are in it, 3 are new" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "2 photos are in it" in told
+    assert "photo 3/3" in told
     report = json.loads((output / "report.json").read_text())
     assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 6)]
     assert report["totals"]["registered"] == 5
