@@ -17,7 +17,7 @@ def add_photos(group: argparse._ActionsContainer) -> None:
         "--max-image-size", type=int, metavar="PX", help="long side to reduce to (default: 1600)"
     )
     group.add_argument(
-        "--max-features", type=int, metavar="N", help="SIFT keypoints a photo (default: 4000)"
+        "--max-features", type=int, metavar="N", help="SIFT keypoints per photo (default: 4000)"
     )
 
 

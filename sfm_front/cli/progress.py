@@ -93,4 +93,4 @@ class CountLine(LiveLine):
 
 def _pace(started: float, done: int, total: int) -> str:
     seconds = (time.perf_counter() - started) / done
-    return f"{seconds:.2f} s a photo  {clock(seconds * (total - done))} left"
+    return f"{seconds:.2f} s per photo  {clock(seconds * (total - done))} left"

@@ -32,7 +32,7 @@ def table(answer: Answer, relevant: Collection[str] | None, count: int) -> str:
 
 
 def rows(answers: Sequence[Answer]) -> list[dict[str, Any]]:
-    """A row a photo, query after query and best first; ``seconds`` are those of the query."""
+    """A row per photo, query by query, best first; ``seconds`` are the query's."""
     return [
         {
             "query": answer.query.name,

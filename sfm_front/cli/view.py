@@ -1,4 +1,4 @@
-"""The ``view`` command: arguments, and what they call."""
+"""Show a sparse model in a window, or save a picture of it."""
 
 from __future__ import annotations
 

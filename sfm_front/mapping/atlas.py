@@ -16,6 +16,7 @@ from sfm_front.events import (
     StartKind,
 )
 from sfm_front.geometry.posed_camera import PosedCamera
+from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
 from sfm_front.mapping.model import MapperOptions, Model, ModelState
@@ -69,13 +70,20 @@ class Atlas:
         view_graph: ViewGraph,
         options: AtlasOptions | None = None,
         emit: Emit | None = None,
+        adjuster: BackgroundAdjuster | None = None,
     ) -> None:
-        """``emit`` hears what becomes of the models, when it does."""
+        """``emit`` hears what becomes of the models, when it does. With an ``adjuster`` no photo
+        waits for a refinement of a whole model."""
+        self._adjuster = adjuster
         self.view_graph = view_graph
         self.options = options or AtlasOptions()
         self.emit = emit or _ignore
         self.initializer = Initializer(
-            view_graph, self.options.initialization, self.options.mapper, self.emit
+            view_graph,
+            self.options.initialization,
+            self.options.mapper,
+            self.emit,
+            adjuster=adjuster,
         )
         self.models: list[Model] = []
 
@@ -84,7 +92,12 @@ class Atlas:
         for reconstruction, state in models:
             self.models.append(
                 Model.restored(
-                    self.view_graph, self.options.mapper, reconstruction, state, self.emit
+                    self.view_graph,
+                    self.options.mapper,
+                    reconstruction,
+                    state,
+                    self.emit,
+                    self._adjuster,
                 )
             )
         self.initializer.go_on_after(max((model.model_id for model in self.models), default=0))

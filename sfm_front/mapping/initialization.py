@@ -8,6 +8,7 @@ from itertools import count
 
 from sfm_front.errors import ConfigError
 from sfm_front.events import Emit, ModelStarted, StartKind
+from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.model import InitialPairConstraints, MapperOptions, Model
 from sfm_front.mapping.view_graph import ViewGraph
 
@@ -85,13 +86,16 @@ class Initializer:
         mapper_options: MapperOptions,
         emit: Emit,
         *,
+        adjuster: BackgroundAdjuster | None = None,
         model_ids: Iterator[int] | None = None,
     ) -> None:
-        """``emit`` hears of each model that is started, and of its refinements."""
+        """``emit`` hears of each model that is started, and of its refinements, which the
+        ``adjuster`` does in the background."""
         self._view_graph = view_graph
         self._options = options
         self._mapper_options = mapper_options
         self._emit = emit
+        self._adjuster = adjuster
         self._model_ids = model_ids or count(1)
         self._tried: set[tuple[int, int, int]] = set()
 
@@ -102,6 +106,7 @@ class Initializer:
             self._options,
             mapper_options,
             self._emit,
+            adjuster=self._adjuster,
             model_ids=self._model_ids,
         )
 
@@ -165,7 +170,9 @@ class Initializer:
     def _start_from(
         self, pair: tuple[int, int], constraints: InitialPairConstraints, kind: StartKind
     ) -> Model | None:
-        model = Model(self._view_graph, self._mapper_options, emit=self._emit)
+        model = Model(
+            self._view_graph, self._mapper_options, emit=self._emit, adjuster=self._adjuster
+        )
         if not model.initialize(*pair, constraints):
             return None
         model.model_id = next(self._model_ids)

@@ -12,6 +12,12 @@ import pycolmap
 
 from sfm_front.errors import ConfigError
 from sfm_front.events import Emit, ModelRefined
+from sfm_front.mapping.background_refinement import (
+    AdjustmentRequest,
+    BackgroundAdjuster,
+    Before,
+    carry_over,
+)
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
 from sfm_front.mapping.calibration import (
     CalibrationOptions,
@@ -23,6 +29,9 @@ from sfm_front.mapping.local_refinement import LocalRefinement, LocalRefinementO
 from sfm_front.mapping.refinement_schedule import RefinementSchedule, ScheduleOptions
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import Float64Array
+
+# Smaller models are refined at once: it takes no longer than to hand them on.
+_SMALLEST_BACKGROUND = 8
 
 # Trials are limited here, by the points a photo sees, not by pycolmap.
 _UNLIMITED_TRIALS = 1_000_000
@@ -168,15 +177,19 @@ class Model:
         options: MapperOptions,
         *,
         emit: Emit | None = None,
+        adjuster: BackgroundAdjuster | None = None,
         reconstruction: pycolmap.Reconstruction | None = None,
     ) -> None:
-        """``emit`` hears of each refinement of the whole model; it goes on from the
-        ``reconstruction`` if one is given."""
+        """``emit`` hears of each refinement of the whole model. With an ``adjuster``, those that
+        fall due while it grows happen in the background. It goes on from the ``reconstruction``
+        if one is given."""
         # 0 until whoever starts it gives it another.
         self.model_id = 0
         self._view_graph = view_graph
         self._options = options
         self._emit = emit
+        self._adjuster = adjuster
+        self._under_way: tuple[int, Before] | None = None
         self._streaming = options.streaming()
         self._mapping = self._streaming.get_mapper()
         self._triangulation = self._streaming.get_triangulation()
@@ -193,11 +206,14 @@ class Model:
         reconstruction: pycolmap.Reconstruction,
         state: ModelState,
         emit: Emit | None = None,
+        adjuster: BackgroundAdjuster | None = None,
     ) -> Model:
         """The model that had this ``state``, over a view graph that holds all its photos."""
         refine = options.refine_intrinsics and state.refine_intrinsics
         options = replace(options, refine_intrinsics=refine)
-        model = cls(view_graph, options, emit=emit, reconstruction=reconstruction)
+        model = cls(
+            view_graph, options, emit=emit, adjuster=adjuster, reconstruction=reconstruction
+        )
         model.model_id = state.model_id
         model._mapping = copy.deepcopy(model._mapping)
         model._mapping.abs_pose_min_num_inliers = state.min_pose_inliers
@@ -270,6 +286,7 @@ class Model:
 
         Registered ones are skipped. Returns the image ids in order of registration.
         """
+        self._take_refined()
         placed: list[int] = []
         left = set(photos) - self.registered
         while (image_id := self._best(left)) is not None:
@@ -278,7 +295,7 @@ class Model:
                 placed.append(image_id)
                 self._local.add(self._mapper, image_id)
                 if self._schedule.is_due(self.num_registered, self.num_points):
-                    self._refine(self._streaming)
+                    self._refine_while_growing()
         return placed
 
     def register_structure_less(self, photos: Iterable[int]) -> list[int]:
@@ -351,12 +368,59 @@ class Model:
         self._seen_at_failure[image_id] = num_visible
         return False
 
-    def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
+    def _refine_while_growing(self) -> None:
+        adjuster = self._adjuster
+        if adjuster is None or self.num_registered < _SMALLEST_BACKGROUND:
+            self._refine(self._streaming)
+            return
+        adjuster.poll()
+        if not adjuster.is_free:
+            return  # it stays due
+        self._begin_anew()
+        self._mapper.complete_and_merge_tracks(self._triangulation)
+        convergence = self._options.convergence
+        request = AdjustmentRequest(
+            tolerance=convergence.global_tolerance,
+            iterations=convergence.global_iterations,
+            num_threads=max(1, self._options.num_threads // 2),
+            refine_intrinsics=self._options.refine_intrinsics,
+        )
+        before = Before.of(self.reconstruction)
+        self._under_way = adjuster.submit(self.reconstruction, request), before
+        self._note_refined()
+
+    def _take_refined(self) -> None:
+        """Carry over what refinement in the background has changed, if it has ended."""
+        if self._adjuster is None or self._under_way is None:
+            return
+        ticket, before = self._under_way
+        self._adjuster.poll()
+        refined = self._adjuster.result(ticket)
+        if refined is None:
+            return
+        self._under_way = None
         started, centers = time.perf_counter(), self._centers()
-        # pycolmap does not count a later photo's correspondences to registered ones; taking a
-        # photo out would then fail. Beginning again over the same model counts afresh.
+        neighbors = {
+            i: sorted(found, key=lambda j: -found[j])
+            for i in self.registered
+            for found in [self._view_graph.neighbors(i)]
+        }
+        carry_over(self.reconstruction, before, refined, neighbors)
+        self._begin_anew()
+        self._mapper.complete_and_merge_tracks(self._triangulation)
+        self._mapper.filter_points(self._mapping)
+        self._announce_refined(time.perf_counter() - started, centers)
+
+    def _begin_anew(self) -> None:
+        """pycolmap does not count a later photo's correspondences to registered ones; taking a
+        photo out would then fail. Beginning again over the same model counts afresh."""
         self._mapper.end_reconstruction(False)
         self._mapper.begin_reconstruction(self.reconstruction)
+
+    def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
+        self._under_way = None
+        started, centers = time.perf_counter(), self._centers()
+        self._begin_anew()
         self._mapper.iterative_global_refinement(
             pipeline.ba_global_max_refinements,
             pipeline.ba_global_max_refinement_change,
@@ -365,8 +429,12 @@ class Model:
             self._triangulation,
         )
         seconds = time.perf_counter() - started
-        self._local.forget(self._mapper)
         self._note_refined()
+        self._announce_refined(seconds, centers)
+
+    def _announce_refined(self, seconds: float, centers: Mapping[int, Float64Array]) -> None:
+        """``centers``: where its photos stood before."""
+        self._local.forget(self._mapper)
         if self._emit is not None:
             self._emit(
                 ModelRefined(

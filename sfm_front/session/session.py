@@ -17,6 +17,7 @@ from sfm_front.events import (
 from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, resolve
 from sfm_front.mapping.atlas import Atlas
+from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.matching.guided_matching import GuidedMatcher
@@ -160,7 +161,14 @@ class Session(Closeable):
             self.options.cameras, self.database.features, self.options.cache_bytes
         )
         self._view_graph = ViewGraph()
-        self._atlas = Atlas(self._view_graph, self.options.atlas, self._announcer.tell_of_model)
+        adjuster = None
+        # With one thread a session is the same to the bit each time: nothing runs beside it.
+        if threads > 1:
+            adjuster = BackgroundAdjuster()
+            opened.callback(adjuster.close)
+        self._atlas = Atlas(
+            self._view_graph, self.options.atlas, self._announcer.tell_of_model, adjuster
+        )
         self._snapshots = Snapshots(self.output / "sparse", self.options.snapshot_seconds)
         self._report = RunReport()
 

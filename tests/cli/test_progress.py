@@ -47,8 +47,8 @@ def test_without_a_terminal_there_is_a_line_a_photo(turn):
     turn(4.0)
     line.show(placed("b.jpg", 2, 150))
     assert stream.getvalue().splitlines() == [
-        "photo 1/4  registered 0  points 0  2.00 s a photo  0:06 left",
-        "photo 2/4  registered 2  points 150  3.00 s a photo  0:06 left",
+        "photo 1/4  registered 0  points 0  2.00 s per photo  0:06 left",
+        "photo 2/4  registered 2  points 150  3.00 s per photo  0:06 left",
     ]
 
 
@@ -114,7 +114,7 @@ def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):
     line.end()
     lines = stream.getvalue().splitlines()
     assert len(lines) == 10
-    assert lines[0] == "indexing photo 4/40  0.50 s a photo  0:18 left"
+    assert lines[0] == "indexing photo 4/40  0.50 s per photo  0:18 left"
     assert lines[-1].startswith("indexing photo 40/40")
 
 

@@ -1,0 +1,176 @@
+"""Global bundle adjustment beside a session: of a copy, whose changes are carried over."""
+
+from __future__ import annotations
+
+import json
+import logging
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from tempfile import TemporaryDirectory
+from threading import Thread
+
+import numpy as np
+import pycolmap
+
+from sfm_front.runtime.closeable import Closeable
+from sfm_front.runtime.subprocess_env import module_environment
+from sfm_front.types import Float64Array
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdjustmentRequest:
+    """How a model is adjusted: relative change of the cost at which it stops, and so on."""
+
+    tolerance: float
+    iterations: int
+    num_threads: int
+    refine_intrinsics: bool
+
+
+class BackgroundAdjuster(Closeable):
+    """Adjusts one model at a time in another process, which starts with the first one."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="sfm_front_refinement_")
+        self._process: subprocess.Popen[str] | None = None
+        self._answers: SimpleQueue[str] = SimpleQueue()
+        self._is_busy = False
+        self._is_broken = False
+        self._ticket = 0
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it can take a model now."""
+        return not self._is_busy and not self._is_broken
+
+    def submit(self, reconstruction: pycolmap.Reconstruction, request: AdjustmentRequest) -> int:
+        """Begin to adjust a copy of a model; returns a ticket for ``result``. It must be free."""
+        model = Path(self._folder.name) / "model"
+        model.mkdir(exist_ok=True)
+        reconstruction.write_binary(model)
+        process = self._running()
+        assert process.stdin is not None
+        try:
+            process.stdin.write(json.dumps({"model": str(model), **vars(request)}) + "\n")
+            process.stdin.flush()
+        except OSError:
+            self._break()
+        self._is_busy = not self._is_broken
+        self._ticket += 1
+        return self._ticket
+
+    def poll(self) -> None:
+        """Note whether the adjustment under way has ended."""
+        if not self._is_busy:
+            return
+        try:
+            answer = self._answers.get_nowait()
+        except Empty:
+            return
+        self._is_busy = False
+        if answer != "done":
+            logger.warning("a model could not be refined beside the session: %s", answer)
+            self._ticket += 1  # nobody has a ticket for this
+            if not answer:
+                self._break()
+
+    def result(self, ticket: int) -> pycolmap.Reconstruction | None:
+        """The adjusted copy; None if it is still under way, failed, or another one came since."""
+        if self._is_busy or ticket != self._ticket:
+            return None
+        return pycolmap.Reconstruction(Path(self._folder.name) / "model")
+
+    def close(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._folder.cleanup()
+
+    def _running(self) -> subprocess.Popen[str]:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "sfm_front.mapping.refinement_process"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=module_environment(),
+                encoding="utf-8",
+                # Ctrl-C is for the session, which ends this with itself.
+                start_new_session=True,
+            )
+            Thread(target=self._listen, args=(self._process,), daemon=True).start()
+        return self._process
+
+    def _listen(self, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            self._answers.put(line.strip())
+        self._answers.put("")
+
+    def _break(self) -> None:
+        """The process has died: refinements fall into the turn of a photo from now on."""
+        logger.warning("the process that refines models has ended")
+        self._is_broken = True
+
+
+@dataclass(frozen=True)
+class Before:
+    """A model as it was when its copy was taken."""
+
+    poses: dict[int, pycolmap.Rigid3d]
+    points: dict[int, Float64Array]
+    cameras: dict[int, Float64Array]
+
+    @classmethod
+    def of(cls, model: pycolmap.Reconstruction) -> Before:
+        """Of a model now."""
+        return cls(
+            {i: model.image(i).cam_from_world() for i in model.reg_image_ids()},
+            {i: model.point3D(i).xyz.copy() for i in model.point3D_ids()},
+            {i: camera.params.copy() for i, camera in model.cameras.items()},
+        )
+
+
+def carry_over(
+    live: pycolmap.Reconstruction,
+    before: Before,
+    refined: pycolmap.Reconstruction,
+    neighbors: Mapping[int, list[int]],
+) -> None:
+    """Change a model that went on growing as refinement changed its copy.
+
+    What both have moves as the copy did, on top of what has happened to it since. A photo that
+    was registered since moves with the first of its ``neighbors`` that the copy has, a new point
+    with the first photo of its track. ``neighbors``: image id → photos it has verified pairs with,
+    most inliers first.
+    """
+    moves = {
+        i: refined.image(i).cam_from_world().inverse() * pose
+        for i, pose in before.poses.items()
+        if refined.image(i).has_pose and live.image(i).has_pose
+    }
+    for image_id in live.reg_image_ids():
+        if image_id not in moves:
+            anchors = (moves[i] for i in neighbors[image_id] if i in before.poses and i in moves)
+            moves[image_id] = next(anchors, pycolmap.Rigid3d())
+    for image_id in live.reg_image_ids():
+        image = live.image(image_id)
+        moved = image.cam_from_world() * moves[image_id].inverse()
+        live.frame(image.frame_id).rig_from_world = moved  # a frame's only image is its camera
+    for point_id in live.point3D_ids():
+        point = live.point3D(point_id)
+        if point_id in before.points and refined.exists_point3D(point_id):
+            point.xyz = point.xyz + refined.point3D(point_id).xyz - before.points[point_id]
+        else:
+            point.xyz = moves[point.track.elements[0].image_id] * point.xyz
+    for camera_id, params in before.cameras.items():
+        camera = live.camera(camera_id)
+        if refined.exists_camera(camera_id):
+            changed = np.asarray(camera.params) + refined.camera(camera_id).params - params
+            camera.params = changed.tolist()
