@@ -25,7 +25,7 @@ from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
 from sfm_front.evaluation.reconstruction.stream import PhotoCost, StreamResult, run_stream
 from sfm_front.events import PhotoAdded
 from sfm_front.mapping.atlas import AtlasOptions
-from sfm_front.mapping.model import MapperOptions
+from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.session.options import SessionOptions, available_cores
 from sfm_front.storage.json_files import write_json
 

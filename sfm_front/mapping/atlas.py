@@ -19,7 +19,8 @@ from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
-from sfm_front.mapping.model import MapperOptions, Model, ModelState
+from sfm_front.mapping.mapper_options import MapperOptions
+from sfm_front.mapping.model import Model, ModelState
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry, View
 
@@ -176,9 +177,14 @@ class Atlas:
         return grew
 
     def settle(self) -> None:
-        """Refine and grow in turn until nothing more registers, failures retried."""
+        """Refine all models, and register what fits them then."""
         for model in self.models:
             model.refine()
+        self.refine_until_stable()
+
+    def refine_until_stable(self) -> None:
+        """Grow and refine in turn until nothing more registers; failed photos are retried."""
+        for model in self.models:
             model.forget_failures()
         while self.grow():
             for model in self.models:

@@ -27,26 +27,17 @@ class _Finishing:
         self._initializer = atlas.initializer
 
     def run(self) -> None:
-        self._refine_until_stable()
+        self._atlas.refine_until_stable()
         self._restart_largest()
         self._start_remaining()
         self._fix_intrinsics()
         self._drop_small()
         while self._register_structure_less():
-            self._refine_until_stable()
+            self._atlas.refine_until_stable()
         for model in self._atlas.models:
             model.finish()
         self._drop_without_pairs()
         self._atlas.drop_covered()
-
-    def _refine_until_stable(self) -> None:
-        """Refine and grow in turn until nothing more registers."""
-        for model in self._atlas.models:
-            model.forget_failures()
-        while self._atlas.grow():
-            for model in self._atlas.models:
-                model.refine()
-                model.forget_failures()
 
     def _restart_largest(self) -> None:
         """If the largest model misses photos linked to it, restart it.
@@ -64,7 +55,7 @@ class _Finishing:
             best = self._atlas.models[0].num_registered if self._atlas.models else 0
             if fresh.num_registered > best:
                 self._atlas.models.insert(0, fresh)
-                self._refine_until_stable()
+                self._atlas.refine_until_stable()
                 continue
             self._atlas.announce_drop(fresh, DropReason.NO_BETTER)
             if 2 * fresh.num_registered > best:
@@ -90,7 +81,7 @@ class _Finishing:
             self._atlas.models[self._atlas.models.index(model)] = fresh
             self._atlas.announce_drop(model, DropReason.REPLACED)
         if miscalibrated:
-            self._refine_until_stable()
+            self._atlas.refine_until_stable()
 
     def _misses_photos(self) -> bool:
         """Whether photos linked to the largest model are in none, or too many in others."""
@@ -115,7 +106,7 @@ class _Finishing:
             model = self._best_start(group, self._initializer, StartKind.LAST_CALL)
             if model is not None:
                 self._atlas.models.append(model)
-                self._refine_until_stable()
+                self._atlas.refine_until_stable()
 
     def _best_start(
         self, group: Collection[int], initializer: Initializer, kind: StartKind

@@ -9,7 +9,8 @@ from itertools import count
 from sfm_front.errors import ConfigError
 from sfm_front.events import Emit, ModelStarted, StartKind
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
-from sfm_front.mapping.model import InitialPairConstraints, MapperOptions, Model
+from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
+from sfm_front.mapping.model import Model
 from sfm_front.mapping.view_graph import ViewGraph
 
 

@@ -5,153 +5,27 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pycolmap
 
-from sfm_front.errors import ConfigError
 from sfm_front.events import Emit, ModelRefined
-from sfm_front.mapping.background_refinement import (
-    AdjustmentRequest,
-    BackgroundAdjuster,
-    Before,
-    carry_over,
-)
-from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
+from sfm_front.mapping.background_refinement import AdjustmentRequest, BackgroundAdjuster
 from sfm_front.mapping.calibration import (
-    CalibrationOptions,
     impossible_photos,
     is_miscalibrated,
 )
+from sfm_front.mapping.carry_over import Before, carry_over
 from sfm_front.mapping.final_adjustment import final_adjustment
-from sfm_front.mapping.local_refinement import LocalRefinement, LocalRefinementOptions
-from sfm_front.mapping.refinement_schedule import RefinementSchedule, ScheduleOptions
+from sfm_front.mapping.local_refinement import LocalRefinement
+from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
+from sfm_front.mapping.refinement_schedule import RefinementSchedule
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import Float64Array
 
 # Smaller models are refined at once: it takes no longer than to hand them on.
 _SMALLEST_BACKGROUND = 8
-
-# Trials are limited here, by the points a photo sees, not by pycolmap.
-_UNLIMITED_TRIALS = 1_000_000
-
-
-@dataclass(frozen=True, kw_only=True)
-class InitialPairConstraints:
-    """What two photos must satisfy to start a model: see COLMAP's ``init_*`` options."""
-
-    min_angle_deg: float
-    min_inliers: int
-    max_forward_motion: float = 0.95
-    # A new model with fewer 3-D points is rejected.
-    min_points: int = 50
-    # Refine focal length and distortion on the pair; few points do not determine them.
-    refine_intrinsics: bool = True
-
-    def __post_init__(self) -> None:
-        if self.min_points < 1:
-            raise ConfigError(f"min_points must be at least 1, got {self.min_points}")
-
-    def applied_to(
-        self, options: pycolmap.IncrementalMapperOptions
-    ) -> pycolmap.IncrementalMapperOptions:
-        """A copy of the options that asks this of an initial pair."""
-        constrained = copy.deepcopy(options)
-        constrained.init_min_tri_angle = self.min_angle_deg
-        constrained.init_min_num_inliers = self.min_inliers
-        constrained.init_max_forward_motion = self.max_forward_motion
-        # A model that starts with few points cannot require more of the photos that follow.
-        constrained.abs_pose_min_num_inliers = min(
-            options.abs_pose_min_num_inliers, self.min_points
-        )
-        return constrained
-
-
-@dataclass(frozen=True, kw_only=True)
-class ConvergenceOptions:
-    """When COLMAP's bundle adjustments stop: tolerances are relative changes of the cost.
-
-    While photos arrive, each adjustment starts close to its optimum and another one follows, so it
-    may stop early (TUNING: streaming-adjustment).
-    """
-
-    # Local adjustments while photos arrive.
-    local_tolerance: float = 1e-4
-    local_iterations: int = 12
-    # Global ones while photos arrive, and how often each alternates with filtering at most.
-    global_tolerance: float = 1e-4
-    global_iterations: int = 15
-    global_refinements: int = 2
-    # Global ones of a complete model, and of a large one. COLMAP's own tolerance is 0. 1e-6 gives
-    # the same model; with 1e-5 a long flight stays bent (TUNING: final-tolerance).
-    final_tolerance: float = 1e-5
-    large_final_tolerance: float = 1e-6
-
-    def __post_init__(self) -> None:
-        for name in vars(self):
-            least = 0 if name.endswith("tolerance") else 1
-            if getattr(self, name) < least:
-                raise ConfigError(f"{name} must be at least {least}, got {getattr(self, name)}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class MapperOptions:
-    """How a model is grown. Everything else is COLMAP's default."""
-
-    # A photo that failed is retried once it sees this many times the points.
-    retry_growth: float = 1.2
-    # Refine focal length and distortion.
-    refine_intrinsics: bool = True
-    # Of the bundle adjustment.
-    num_threads: int = 2
-    # Of all RANSAC.
-    seed: int = 0
-    schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
-    convergence: ConvergenceOptions = field(default_factory=ConvergenceOptions)
-    local_refinement: LocalRefinementOptions = field(default_factory=LocalRefinementOptions)
-    # The last adjustment; it takes threads, intrinsics and what counts as large from here.
-    robust: RobustAdjustmentOptions = field(default_factory=RobustAdjustmentOptions)
-    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
-
-    def __post_init__(self) -> None:
-        if self.retry_growth < 1:
-            raise ConfigError(f"retry_growth must be at least 1, got {self.retry_growth}")
-        if self.num_threads < 1:
-            raise ConfigError(f"num_threads must be at least 1, got {self.num_threads}")
-        robust = replace(
-            self.robust,
-            refine_intrinsics=self.refine_intrinsics,
-            num_threads=self.num_threads,
-            large_from=self.schedule.large_from,
-        )
-        object.__setattr__(self, "robust", robust)
-
-    def final(self, num_photos: int) -> pycolmap.IncrementalPipelineOptions:
-        """pycolmap's options for a complete model of ``num_photos``."""
-        options = pycolmap.IncrementalPipelineOptions()
-        large = num_photos >= self.schedule.large_from
-        options.ba_global_function_tolerance = (
-            self.convergence.large_final_tolerance if large else self.convergence.final_tolerance
-        )
-        options.num_threads = self.num_threads
-        options.random_seed = self.seed
-        options.ba_refine_focal_length = self.refine_intrinsics
-        options.ba_refine_extra_params = self.refine_intrinsics
-        options.mapper.max_reg_trials = _UNLIMITED_TRIALS
-        options.mapper.abs_pose_refine_focal_length = self.refine_intrinsics
-        options.mapper.abs_pose_refine_extra_params = self.refine_intrinsics
-        return options
-
-    def streaming(self) -> pycolmap.IncrementalPipelineOptions:
-        """The same while photos arrive, with bundle adjustments that stop early."""
-        options = self.final(0)
-        options.ba_local_function_tolerance = self.convergence.local_tolerance
-        options.ba_local_max_num_iterations = self.convergence.local_iterations
-        options.ba_global_function_tolerance = self.convergence.global_tolerance
-        options.ba_global_max_num_iterations = self.convergence.global_iterations
-        options.ba_global_max_refinements = self.convergence.global_refinements
-        return options
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ from sfm_front.cli.config_file import TAKEN_FROM, as_toml, read_options
 from sfm_front.cli.main import main
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.mapping.initialization import ConstraintLevel, InitializationOptions
-from sfm_front.mapping.model import InitialPairConstraints
+from sfm_front.mapping.mapper_options import InitialPairConstraints
 from sfm_front.matching.guided_matching import GuidedOptions
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.photos.cameras import CameraOptions

@@ -24,7 +24,8 @@ from sfm_front.events import (
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.initialization import InitializationOptions
-from sfm_front.mapping.model import MapperOptions, Model
+from sfm_front.mapping.mapper_options import MapperOptions
+from sfm_front.mapping.model import Model
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry
 

@@ -14,14 +14,11 @@ from helpers.photo_stream import SceneFeed, position_errors_m
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import ModelEvent, ModelRefined
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
-from sfm_front.mapping.background_refinement import (
-    AdjustmentRequest,
-    BackgroundAdjuster,
-    Before,
-    carry_over,
-)
+from sfm_front.mapping.background_refinement import AdjustmentRequest, BackgroundAdjuster
+from sfm_front.mapping.carry_over import Before, carry_over
 from sfm_front.mapping.finishing import finish
-from sfm_front.mapping.model import InitialPairConstraints, MapperOptions, Model
+from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
+from sfm_front.mapping.model import Model
 
 NUM_PHOTOS = 16
 REQUEST = AdjustmentRequest(tolerance=1e-6, iterations=30, num_threads=1, refine_intrinsics=True)

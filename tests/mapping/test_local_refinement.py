@@ -12,7 +12,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
 from sfm_front.evaluation.synthetic.scene import make_scene
 from sfm_front.mapping.local_refinement import LocalRefinement, LocalRefinementOptions
-from sfm_front.mapping.model import MapperOptions
+from sfm_front.mapping.mapper_options import MapperOptions
 
 NUM_PHOTOS = 8
 POSE_TOLERANCE_DEG = 0.02

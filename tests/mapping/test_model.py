@@ -11,12 +11,12 @@ from helpers.photo_stream import SceneFeed, position_errors_m
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.mapping.model import (
+from sfm_front.mapping.mapper_options import (
     ConvergenceOptions,
     InitialPairConstraints,
     MapperOptions,
-    Model,
 )
+from sfm_front.mapping.model import Model
 from sfm_front.mapping.refinement_schedule import ScheduleOptions
 
 DEMANDS = InitialPairConstraints(min_angle_deg=10, min_inliers=50)

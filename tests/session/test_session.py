@@ -28,7 +28,7 @@ from sfm_front.events import (
     SessionStarted,
 )
 from sfm_front.mapping.atlas import AtlasOptions
-from sfm_front.mapping.model import MapperOptions
+from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.photos.cameras import CameraOptions
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
