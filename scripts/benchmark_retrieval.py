@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import zlib  # noqa: F401  (before pycolmap)
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
