@@ -137,6 +137,10 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.folder is None:
         arguments.usage_error("the following arguments are required: folder")
+    if arguments.idle_timeout is not None and not arguments.watch:
+        arguments.usage_error("--idle-timeout goes with --watch")
+    if arguments.order != "name" and arguments.watch:
+        arguments.usage_error("--watch takes photos as they come: leave --order out")
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
@@ -145,12 +149,17 @@ def run(arguments: argparse.Namespace) -> int:
     overwrite, append = arguments.overwrite, arguments.append
     # Once more: pycolmap has put a handler of its own for SIGTERM in place.
     with leaving_at_signal(1):
-        from sfm_front.photos.watch import WatchOptions, watch_photos
+        from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
         from sfm_front.session.resume import Newcomers, nothing_to_do
         from sfm_front.session.session import Session
 
         options = session_options(arguments)
-        photos = [] if arguments.watch else _photos(arguments, output, options)
+        watch = WatchOptions(idle_timeout_s=arguments.idle_timeout)
+        photos = []
+        if arguments.watch:
+            check_watchable(folder)
+        else:
+            photos = _photos(arguments, output, options)
         if not (arguments.watch or overwrite) and nothing_to_do(
             output, options, folder, photos, append=append
         ):
@@ -169,7 +178,6 @@ def run(arguments: argparse.Namespace) -> int:
         newcomers = Newcomers(session.database, folder, output, append=append)
         arriving: Iterable[PhotoPath | NotYet]
         if arguments.watch:
-            watch = WatchOptions(idle_timeout_s=arguments.idle_timeout)
             appearing = watch_photos(
                 folder, watch, exclude=output, stop=interrupted, note=progress.note
             )
@@ -184,7 +192,7 @@ def run(arguments: argparse.Namespace) -> int:
         progress.finishing()
         result = session.finish()
         progress.end()
-        progress.note(closing_summary(result.summary, output))
+        progress.note(closing_summary(result.summary, output, watched=arguments.watch))
     return 0 if result.models else 1
 
 

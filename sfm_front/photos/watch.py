@@ -49,6 +49,12 @@ class WatchOptions:
             raise ConfigError(f"idle_timeout_s must be at least 0, got {self.idle_timeout_s}")
 
 
+def check_watchable(folder: Path) -> None:
+    """Raises InputError if something else than a folder is there; it may be missing."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: not a folder. Give the folder where the photos appear.")
+
+
 def watch_photos(
     folder: Path,
     options: WatchOptions | None = None,
@@ -59,9 +65,10 @@ def watch_photos(
 ) -> Generator[PhotoPath | NotYet, None, None]:
     """The photos that are there, in the order of ``list_photos``, then those that appear.
 
-    Photos are those of ``list_photos``, with the same names; no name comes twice. They are known
-    by their extension, so ``a.jpg.part`` or ``a.jpg~`` is left alone until it is renamed. A file
-    under way does not hold up those after it.
+    Photos are those of ``list_photos``, with the same names. They are known by their extension, so
+    ``a.jpg.part`` or ``a.jpg~`` is left alone until it is renamed. A file under way does not hold
+    up those after it. No name comes twice, except of a file that was not whole when patience ended
+    and has changed since.
 
     Whenever no photo is ready, ``NotYet`` comes, some 30 times a second: so whoever takes the
     photos can do other work meanwhile; its ``seconds`` count from the last photo that appeared,
@@ -70,13 +77,12 @@ def watch_photos(
     It ends once ``stop`` says so (``threading.Event().is_set`` will do), or after
     ``options.idle_timeout_s``, and may be closed at any time. ``folder`` may be missing at the
     start, or vanish and come back: it is waited for. ``note`` hears of that, and of photos that
-    were deleted or replaced before they were taken, in one line each. Raises InputError if it is
-    no folder.
+    were deleted or replaced before they were taken, in one line each. Raises InputError as
+    ``check_watchable`` does.
 
     Everything here runs in the thread that asks for the next item, ``stop`` and ``note`` too.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: not a folder. Give the folder where the photos appear.")
+    check_watchable(folder)
     watched = _WatchedFolder(folder, options or WatchOptions(), exclude, note)
     try:
         while not stop():
@@ -135,7 +141,8 @@ class _WatchedFolder:
         self._was_there = False
         # By name, in the order they were found.
         self._waiting: dict[str, _Waiting] = {}
-        self._taken: set[str] = set()
+        # Their state if they were not whole then, else None.
+        self._taken: dict[str, _FileState | None] = {}
         self._unlistable: set[str] = set()
         # All by the monotonic clock.
         self._last_news = time.monotonic()
@@ -174,7 +181,7 @@ class _WatchedFolder:
                 self._last_news = now
             elif self._is_ready(waiting, now - waiting.since):
                 del self._waiting[name]
-                self._taken.add(name)
+                self._taken[name] = state if waiting.is_cut_short else None
                 self._last_news = now
                 return waiting.photo
         return None
@@ -247,11 +254,13 @@ class _WatchedFolder:
         found = find_photos(self._folder, exclude=self._exclude, on_error=self._cannot_be_listed)
         num_before = len(self._waiting)
         for photo in found:
-            if photo.name not in self._taken and photo.name not in self._waiting:
-                state = _state_of(photo.path)
-                if state is not None:
-                    self._last_news = time.monotonic()
-                    self._waiting[photo.name] = _Waiting(photo, state, self._last_news)
+            before = self._taken.get(photo.name)
+            if photo.name in self._waiting or (photo.name in self._taken and before is None):
+                continue
+            state = _state_of(photo.path)
+            if state not in (None, before):
+                self._last_news = time.monotonic()
+                self._waiting[photo.name] = _Waiting(photo, state, self._last_news)
         now = time.monotonic()
         self._no_listing_before = now + (now - began) * (1 / _LISTING_SHARE - 1)
         self._next_listing = now + self._options.rescan_s

@@ -8,6 +8,7 @@ from typing import Any
 
 from sfm_front.errors import InputError
 from sfm_front.reports.run_summary import (
+    Latency,
     ModelOutcome,
     Outcome,
     PhotoOutcome,
@@ -56,6 +57,7 @@ def write_report(output: Path, summary: RunSummary) -> None:
             "seconds_by_stage": _rounded(totals.seconds_by_stage),
             "median_seconds_by_quarter": [round(s, 4) for s in totals.median_seconds_by_quarter],
             "peak_memory_bytes": totals.peak_memory_bytes,
+            "latency_seconds": _latency_row(totals.latency),
         },
     }
     write_json(output / FILE, content)
@@ -98,6 +100,12 @@ def _row(photo: Outcome) -> dict[str, Any]:
     }
 
 
+def _latency_row(latency: Latency | None) -> dict[str, float] | None:
+    if latency is None:
+        return None
+    return _rounded({"median": latency.median_s, "p95": latency.p95_s, "worst": latency.worst_s})
+
+
 def _rounded(seconds: dict[str, float]) -> dict[str, float]:
     return {stage: round(value, 4) for stage, value in seconds.items()}
 
@@ -128,8 +136,15 @@ def _summary(content: dict[str, Any]) -> RunSummary:
             seconds_by_stage=totals["seconds_by_stage"],
             median_seconds_by_quarter=tuple(totals["median_seconds_by_quarter"]),
             peak_memory_bytes=totals["peak_memory_bytes"],
+            latency=_latency(
+                totals.get("latency_seconds")
+            ),  # absent in reports of earlier versions
         ),
     )
+
+
+def _latency(row: dict[str, float] | None) -> Latency | None:
+    return None if row is None else Latency(row["median"], row["p95"], row["worst"])
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:

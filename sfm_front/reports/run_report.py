@@ -11,6 +11,7 @@ from itertools import pairwise
 
 from sfm_front.events import PREFETCHED_STAGES, ModelEvent, ModelRefined, PhotoAdded
 from sfm_front.reports.run_summary import (
+    Latency,
     ModelOutcome,
     Outcome,
     PhotoOutcome,
@@ -27,9 +28,14 @@ class RunReport:
         self._started = time.perf_counter()
         self._photos: list[Skipped | PhotoAdded] = []
         self._restored: set[int] = set()
+        self._skipped: dict[str, Skipped] = {}
 
     def add(self, photo: Skipped | PhotoAdded) -> None:
-        """Note a photo."""
+        """Note a photo. One that was skipped, cut off perhaps, and comes again counts once."""
+        if photo.name in self._skipped:
+            self._photos.remove(self._skipped.pop(photo.name))
+        if isinstance(photo, Skipped):
+            self._skipped[photo.name] = photo
         self._photos.append(photo)
 
     def restore(self, photo: StoredPhoto) -> None:
@@ -52,11 +58,13 @@ class RunReport:
         *,
         seconds: Mapping[str, float],
         events: Sequence[ModelEvent],
+        latencies_s: Sequence[float],
     ) -> RunSummary:
         """Sum up.
 
         ``why_not``: image id → why it is in no model. ``seconds`` by stage and ``events`` of the
-        end.
+        end and of idle times. ``latencies_s``: from arrival to pose, of each photo of this run that
+        was placed.
         """
         model_of = {
             image_id: number
@@ -77,11 +85,15 @@ class RunReport:
             ),
             end_seconds=dict(seconds),
             end_events=_in_words(events),
-            totals=self._totals(models, len(model_of), seconds),
+            totals=self._totals(models, len(model_of), seconds, latencies_s),
         )
 
     def _totals(
-        self, models: Sequence[ModelSummary], num_registered: int, seconds: Mapping[str, float]
+        self,
+        models: Sequence[ModelSummary],
+        num_registered: int,
+        seconds: Mapping[str, float],
+        latencies_s: Sequence[float],
     ) -> Totals:
         used = [photo for photo in self._photos if isinstance(photo, PhotoAdded)]
         by_stage: Counter[str] = Counter(dict(seconds))
@@ -101,6 +113,7 @@ class RunReport:
                 [photo for photo in used if photo.image_id not in self._restored]
             ),
             peak_memory_bytes=_peak_memory_bytes(),
+            latency=Latency.of(latencies_s),
         )
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -42,10 +45,34 @@ class ModelOutcome:
 
 
 @dataclass(frozen=True, slots=True)
+class Latency:
+    """How long photos took, in seconds; 95 % of them took ``p95_s`` or less."""
+
+    median_s: float
+    p95_s: float
+    worst_s: float
+
+    @classmethod
+    def of(cls, seconds: Sequence[float]) -> Latency | None:
+        """None if there are none."""
+        if not seconds:
+            return None
+        ordered = sorted(seconds)
+        # Nearest rank: one of the photos did take so long.
+        p95_s = ordered[math.ceil(0.95 * len(ordered)) - 1]
+        return cls(statistics.median(ordered), p95_s, ordered[-1])
+
+
+@dataclass(frozen=True, slots=True)
 class Totals:
     """The whole session in numbers.
 
     ``median_seconds_by_quarter``: work on a photo in its turn, see ``run_report``.
+
+    ``latency``: from arrival to the first pose, of the photos that this run took in and placed, at
+    its end too; None if there are none. A photo of a watched folder arrives when it is taken up:
+    its file has rested by then, and the session is free to look. One of a folder given at once
+    arrives when it is read ahead, so this says little of how fast a new photo would be placed.
     """
 
     num_photos: int
@@ -57,6 +84,7 @@ class Totals:
     seconds_by_stage: dict[str, float]
     median_seconds_by_quarter: tuple[float, ...]
     peak_memory_bytes: int | None
+    latency: Latency | None
 
 
 Outcome: TypeAlias = Skipped | PhotoOutcome
@@ -64,7 +92,10 @@ Outcome: TypeAlias = Skipped | PhotoOutcome
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """Photos in order of arrival, models largest first, and how the session ended."""
+    """Photos in order of arrival, models largest first, and how the session ended.
+
+    ``end_events`` are those of idle times, too.
+    """
 
     photos: tuple[Outcome, ...]
     models: tuple[ModelOutcome, ...]

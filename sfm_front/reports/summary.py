@@ -8,8 +8,11 @@ from pathlib import Path
 from sfm_front.reports.run_summary import RunSummary
 
 
-def closing_summary(summary: RunSummary, output: Path) -> str:
-    """What a user reads at the end of a run that wrote to ``output``."""
+def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False) -> str:
+    """What a user reads at the end of a run that wrote to ``output``.
+
+    ``watched``: photos arrived one by one, so that their latency means something to the user.
+    """
     totals = summary.totals
     lines = [
         f"{totals.num_registered} of {totals.num_photos} photos registered in "
@@ -31,6 +34,12 @@ def closing_summary(summary: RunSummary, output: Path) -> str:
             "work per photo without global refinement, median by quarter of the run: "
             + ", ".join(f"{seconds:.2f} s" for seconds in by_quarter)
         )
+    if watched and totals.latency:
+        latency = totals.latency
+        lines.append(
+            f"from arrival to pose: median {latency.median_s:.2f} s, "
+            f"95 % within {latency.p95_s:.2f} s, worst {latency.worst_s:.2f} s"
+        )
     lines += _reasons("skipped", [(photo.name, str(photo)) for photo in summary.skipped])
     lines += _reasons(
         "not registered",
@@ -42,6 +51,8 @@ def closing_summary(summary: RunSummary, output: Path) -> str:
 
 
 def _advice(summary: RunSummary) -> str:
+    if not summary.photos:
+        return "no model could be built: no photo came"
     if not summary.used:
         return "no model could be built: no photo could be read"
     # Each but the first can have pairs with earlier photos.

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, overload
 
@@ -76,21 +76,29 @@ def named_in_session(
 ) -> list[PhotoPath]:
     """The photos of a folder under their names in the session, which remembers the folder.
 
-    Names are those below the folder. If another folder has such names already, the new one's
-    photos are named after their folder too. Raises InputError if the session is over another
-    folder and ``append`` is not wanted.
+    Names are those below the folder. Photos of every further folder are named after it, too: any
+    name may still appear in either. Raises InputError if the session is over another folder and
+    ``append`` is not wanted.
     """
     here = str(folder.resolve())
-    prefixes: dict[str, str] = json.loads(database.recall(_SOURCES) or "{}")
+    prefixes = _prefixes(database, folder, output, append=append)
     if here not in prefixes:
-        if prefixes and not append:
-            raise InputError(
-                f"{output}: holds the photos of {next(iter(prefixes))}. Give --append to add those "
-                f"of {folder} to it, or another --output."
-            )
         prefixes[here] = _free_prefix(database, folder, photos, set(prefixes.values()))
         database.remember(_SOURCES, json.dumps(prefixes))
     return [PhotoPath(prefixes[here] + photo.name, photo.path) for photo in photos]
+
+
+def _prefixes(
+    database: PhotoDatabase, folder: Path, output: Path, *, append: bool
+) -> dict[str, str]:
+    """Folder → what precedes its photos' names. Raises InputError if ``folder`` may not come."""
+    prefixes: dict[str, str] = json.loads(database.recall(_SOURCES) or "{}")
+    if prefixes and not append and str(folder.resolve()) not in prefixes:
+        raise InputError(
+            f"{output}: holds the photos of {next(iter(prefixes))}. Give --append to add those "
+            f"of {folder} to it, or another --output."
+        )
+    return prefixes
 
 
 def _free_prefix(
@@ -99,12 +107,10 @@ def _free_prefix(
     names = {photo.name for photo in database.photos()}
     names |= {photo.name for photo, _ in database.skipped()}
     own = {photo.name for photo in photos}
-    if not names & own:
-        return ""
     numbered = (f"{folder.resolve().name}{number or ''}/" for number in count())
     return next(
         prefix
-        for prefix in numbered
+        for prefix in chain([""], numbered)
         if prefix not in taken and not names & {prefix + name for name in own}
     )
 
@@ -115,7 +121,11 @@ class Newcomers:
     def __init__(
         self, database: PhotoDatabase, folder: Path, output: Path, *, append: bool
     ) -> None:
-        """``append``: whether photos of another folder may be added."""
+        """``append``: whether photos of another folder may be added.
+
+        Raises InputError if they may not, and the session is over another folder.
+        """
+        _prefixes(database, folder, output, append=append)
         self._database = database
         self._folder = folder
         self._output = output
@@ -136,8 +146,6 @@ class Newcomers:
     ) -> Iterator[PhotoPath | NotYet]:
         """New photos, in their order. A file that was skipped and has changed since is new; one
         that was used and has changed stays as it was, and is told to ``note``.
-
-        Raises InputError if the session is over another folder and ``append`` is not wanted.
         """
         if isinstance(photos, Sequence):
             photos = self._named(photos)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sfm_front.events import (
     Listener,
+    ModelEvent,
     ModelRefined,
     PhotoAdded,
     SessionEnded,
@@ -120,6 +121,7 @@ class Session(Closeable):
         self._finished = False
         # Whether the time has been used since the last photo.
         self._is_idle = True
+        self._idle_events: list[ModelEvent] = []
         self._announcer = Announcer([] if on_event is None else [on_event])
         # What is open is closed again if a later part cannot be made.
         with ExitStack() as opened:
@@ -234,6 +236,8 @@ class Session(Closeable):
         self._atlas.settle()
         for image_id in sorted(self._atlas.registered - before):
             self._announcer.tell_placed(self._atlas, image_id)
+        # The next photo must not be charged with them.
+        self._idle_events += self._announcer.pop_model_events()
         self._snapshots.write(self._atlas.models, len(self._catalog), self._catalog.colors)
 
     def _arrive(self, photo: PhotoPath | NotYet) -> PhotoPath | NotYet:
@@ -247,13 +251,13 @@ class Session(Closeable):
         """
         if self._finished:
             raise RuntimeError("the session is finished: begin another one for more photos")
-        self._is_idle = False
         added = photo if isinstance(photo, Skipped) else self._add(photo)
         self._report.add(added)
         if isinstance(added, Skipped):
             self.database.write_skipped(added, self._announcer.path_of(added.name))
             self._announcer.tell(added)
         else:
+            self._is_idle = False
             self._retrieval_log.add(added)
             self._announcer.tell(added)
             placed = [self._catalog.image_id(name) for name in added.registered]
@@ -285,7 +289,8 @@ class Session(Closeable):
             models,
             {i: self._atlas.why_not_registered(i) for i in self._atlas.waiting},
             seconds=clock.seconds,
-            events=self._announcer.pop_model_events(),
+            events=(*self._idle_events, *self._announcer.pop_model_events()),
+            latencies_s=self._announcer.latencies_s,
         )
         write_report(self.output, summary)
         mark_finished(self.database)

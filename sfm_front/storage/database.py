@@ -111,9 +111,11 @@ class PhotoDatabase(Closeable):
     ) -> None:
         """Write a photo, its camera and its pairs; if this raises, no row of the photo remains.
 
-        Ids are those given. A frame has its image's id, a rig its camera's.
+        It is not skipped any more, if it was. Ids are those given. A frame has its image's id, a
+        rig its camera's.
         """
         with self._transaction():
+            self._execute("DELETE FROM sfm_front_skipped WHERE name = ?", (photo.name,))
             for row in camera_rows(camera):
                 self._insert(row)
             for row in photo_rows(image_id, photo, camera.camera_id):

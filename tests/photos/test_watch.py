@@ -224,6 +224,22 @@ def test_a_file_that_never_becomes_whole_is_handed_on(tmp_path: Path, watching: 
     watching(tmp_path, patience_s=1.0).take("c.jpg", "a.jpg", "b.jpg")
 
 
+def test_a_file_that_was_handed_on_cut_short_comes_again_once_it_is_whole(
+    tmp_path: Path, watching: Begin
+) -> None:
+    """A copy may stall for longer than patience lasts, and go on."""
+    write(tmp_path / "a.jpg", content()[:-100])
+    write(tmp_path / "b.jpg")
+    watched = watching(tmp_path, patience_s=0.2)
+    watched.take("b.jpg", "a.jpg")
+    watched.take_none()
+    write(tmp_path / "a.jpg")
+    watched.take("a.jpg")
+    # Whole now: what becomes of it after that is nobody's business.
+    write(tmp_path / "a.jpg", content(1))
+    watched.take_none()
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="links need a right there")
 def test_a_link_to_nowhere_is_handed_on(tmp_path: Path, watching: Begin) -> None:
     (tmp_path / "a.jpg").symlink_to(tmp_path / "nowhere.jpg")
@@ -479,9 +495,9 @@ def test_a_folder_that_cannot_be_listed_is_named_once(
 def test_read_ahead_each_photo_is_handed_on_before_the_next_appears(tmp_path: Path) -> None:
     """A photo is written only when the one before it has come out."""
     write(tmp_path / "0.jpg")
-    options = WatchOptions(rest_s=REST_S, idle_timeout_s=0.5)
-    photos = watch_photos(tmp_path, options)
-    results = []
+    results: list[str] = []
+    options = WatchOptions(rest_s=REST_S, idle_timeout_s=DEADLINE_S)
+    photos = watch_photos(tmp_path, options, stop=lambda: len(results) == 4)
     with closing(prefetch(lambda photo: photo.name, photos, num_threads=2)) as stream:
         for result in stream:
             if not isinstance(result, NotYet):

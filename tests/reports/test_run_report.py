@@ -12,7 +12,7 @@ from sfm_front.errors import InputError
 from sfm_front.events import ModelRefined, ModelStarted, PhotoAdded, StartKind
 from sfm_front.reports.report_json import read_report, write_report
 from sfm_front.reports.run_report import RunReport
-from sfm_front.reports.run_summary import RunSummary
+from sfm_front.reports.run_summary import Latency, RunSummary
 from sfm_front.types import (
     CandidateOutcome,
     ModelSummary,
@@ -78,7 +78,13 @@ def run(tmp_path) -> RunSummary:
         summary(tmp_path, 1, ["ä 1.jpg"], error_px=1.5, points=100),
     ]
     why_not = {3: "no verified matches"}
-    return report.finish(models, why_not, seconds={"export": 0.75}, events=[REFINED, STARTED])
+    return report.finish(
+        models,
+        why_not,
+        seconds={"export": 0.75},
+        events=[REFINED, STARTED],
+        latencies_s=[2.0, 0.12345678],
+    )
 
 
 @pytest.fixture
@@ -146,6 +152,7 @@ def test_totals(content):
         "mean_reprojection_error_px": 0.75,  # of all points: (300 * 0.5 + 100 * 1.5) / 400
         "seconds_by_stage": {"export": 0.75, "sift": 0.75, "map": 0.125},
         "median_seconds_by_quarter": [0, 0.125, 0],
+        "latency_seconds": {"median": 1.0617, "p95": 2.0, "worst": 2.0},
     }
 
 
@@ -175,14 +182,49 @@ def test_work_by_quarter_is_what_a_photo_waits_for_in_its_turn():
     for number in range(1, 9):
         seconds = {"match": float(number), "refine": 100.0, "sift": 10.0, "read": 1.0}
         report.add(PhotoAdded(f"{number}.jpg", image_id=number, seconds=seconds))
-    run = report.finish([], {}, seconds={}, events=())
+    run = report.finish([], {}, seconds={}, events=(), latencies_s=())
     assert run.totals.median_seconds_by_quarter == (1.5, 3.5, 5.5, 7.5)
 
 
 def test_without_models_there_is_still_a_report():
     report = RunReport()
     report.add(BROKEN)
-    run = report.finish([], {}, seconds={}, events=[])
+    run = report.finish([], {}, seconds={}, events=[], latencies_s=[])
     assert run.models == ()
     assert run.totals.num_registered == 0
     assert run.totals.mean_reprojection_error_px is None
+    assert run.totals.latency is None
+
+
+def test_a_photo_that_was_skipped_and_comes_again_counts_once():
+    report = RunReport()
+    whole = PhotoAdded("a.jpg", image_id=1)
+    copy = Skipped("a.jpg", SkipReason.DUPLICATE, "same file as a.jpg")
+    for photo in (Skipped("a.jpg", SkipReason.TRUNCATED), BROKEN, BROKEN, whole):
+        report.add(photo)
+    run = report.finish([], {}, seconds={}, events=[], latencies_s=[])
+    assert [photo.name for photo in run.photos] == ["broken.jpg", "a.jpg"]
+    assert run.skipped == [BROKEN]
+    # A copy under the same name does not take the place of the photo itself.
+    report.add(copy)
+    run = report.finish([], {}, seconds={}, events=[], latencies_s=[])
+    assert run.skipped == [BROKEN, copy]
+    assert len(run.used) == 1
+
+
+def test_of_latencies_95_percent_are_no_longer_than_said():
+    assert Latency.of([]) is None
+    assert Latency.of([0.5]) == Latency(0.5, 0.5, 0.5)
+    assert Latency.of([float(n) for n in range(100, 0, -1)]) == Latency(50.5, 95.0, 100.0)
+    assert Latency.of([1.0] * 19 + [9.0]) == Latency(1.0, 1.0, 9.0)
+
+
+@pytest.mark.usefixtures("content")
+def test_latency_is_read_back_and_earlier_versions_have_none(tmp_path):
+    read = read_report(tmp_path).totals.latency
+    assert read == Latency(1.0617, 2.0, 2.0)
+    file = tmp_path / "report.json"
+    content = json.loads(file.read_text(encoding="utf-8"))
+    del content["totals"]["latency_seconds"]
+    file.write_text(json.dumps(content), encoding="utf-8")
+    assert read_report(tmp_path).totals.latency is None

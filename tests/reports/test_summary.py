@@ -8,7 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from sfm_front.reports.run_summary import ModelOutcome, Outcome, PhotoOutcome, RunSummary, Totals
+from sfm_front.reports.run_summary import (
+    Latency,
+    ModelOutcome,
+    Outcome,
+    PhotoOutcome,
+    RunSummary,
+    Totals,
+)
 from sfm_front.reports.summary import closing_summary
 from sfm_front.types import Skipped, SkipReason
 
@@ -38,6 +45,7 @@ def summary(photos: Sequence[Outcome], num_models: int = 1) -> RunSummary:
             seconds_by_stage={"sift": 4.0, "map": 2.0},
             median_seconds_by_quarter=(1.0, 2.0, 2.5, 2.25),
             peak_memory_bytes=None,
+            latency=Latency(0.789, 1.5, 2.0),
         ),
     )
 
@@ -77,6 +85,24 @@ def test_without_a_model_it_says_what_to_do():
     text = closing_summary(summary([waiting("a.jpg", "no verified matches")], 0), Path("out"))
     assert text.startswith("0 of 1 photos registered in 0 models")
     assert "overlap" in text.splitlines()[-1]
+
+
+def test_latency_is_told_of_a_watched_folder():
+    told = closing_summary(summary([PLACED]), Path("out"), watched=True)
+    line = "from arrival to pose: median 0.79 s, 95 % within 1.50 s, worst 2.00 s"
+    assert line in told.splitlines()
+    assert "arrival" not in closing_summary(summary([PLACED]), Path("out"))
+
+
+def test_without_a_pose_there_is_no_latency_to_tell():
+    run = summary([waiting("a.jpg", "no verified matches")], 0)
+    run = replace(run, totals=replace(run.totals, latency=None))
+    assert "arrival" not in closing_summary(run, Path("out"), watched=True)
+
+
+def test_where_no_photo_came_that_is_said():
+    text = closing_summary(summary([], 0), Path("out"))
+    assert text.splitlines()[-1] == "no model could be built: no photo came"
 
 
 def test_where_nothing_could_be_read_more_overlap_is_no_advice():

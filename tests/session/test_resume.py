@@ -257,6 +257,18 @@ def test_a_used_photo_that_changed_is_told_and_a_skipped_one_is_tried_again(data
     assert told == "a.jpg: has changed since it was taken in; the old one stays"
 
 
+def test_another_folder_is_refused_before_it_holds_a_photo(database, folder, tmp_path):
+    database.remember("sources", json.dumps({str(folder[0].path.parent.resolve()): ""}))
+    with pytest.raises(InputError, match="Give --append to add those of"):
+        Newcomers(database, tmp_path / "still empty", tmp_path, append=False)
+
+
+def test_a_file_that_was_skipped_is_so_no_longer_once_it_is_used(orbit, database, folder):
+    used = replace(described(orbit, 1), name="b.jpg", path=folder[1].path)
+    database.write(2, used, orbit.camera, [])
+    assert database.skipped() == []
+
+
 def test_another_folder_is_added_only_when_wanted(database, folder, tmp_path):
     def named(where: Path, photos: list[PhotoPath], append: bool = False) -> list[str]:
         named = named_in_session(database, where, photos, tmp_path, append=append)
@@ -270,6 +282,9 @@ def test_another_folder_is_added_only_when_wanted(database, folder, tmp_path):
     assert named(second, folder, append=True)[0] == "flight1/a.jpg"
     other = [PhotoPath("z.jpg", tmp_path / "z.jpg")]
     assert named(third, other, append=True) == ["z.jpg"]
+    # Names that may still come in a fourth must not be those of the third.
+    assert named(tmp_path / "four", [], append=True) == []
+    assert named(tmp_path / "four", other) == ["four/z.jpg"]
     # Each folder keeps the names it was given.
     assert named(second, folder)[0] == "flight1/a.jpg"
     assert named(first, folder)[0] == "flight/a.jpg"

@@ -12,6 +12,7 @@ import numpy as np
 import pycolmap
 import pytest
 from helpers.library_threads import library_threads, needs_blas, several_threads
+from helpers.locations import VILLAGE
 from helpers.photo_files import save
 from helpers.photo_stream import described, position_errors_m, registered_names, true_matches
 
@@ -30,6 +31,7 @@ from sfm_front.events import (
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.photos.cameras import CameraOptions
+from sfm_front.reports.run_summary import Latency
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
 from sfm_front.types import ModelSummary, PhotoPath, Skipped, SkipReason
@@ -186,6 +188,44 @@ def test_a_listener_hears_of_everything_as_it_happens(orbit, tmp_path):
     assert [json.loads(line)["event"] for line in lines][-1] == "session_ended"
 
 
+def test_idle_time_is_used_once_and_no_photo_is_charged_with_it(orbit, tmp_path):
+    heard: list[Event] = []
+    unreadable = Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")
+    with Session(tmp_path / "out", options(), on_event=heard.append) as session:
+        for index in range(6):
+            session.add_extracted(described(orbit, index))
+
+        def refined_while_idle(seconds: float) -> float:
+            heard.clear()
+            session.idle(seconds)
+            return sum(event.seconds for event in heard if isinstance(event, ModelRefined))
+
+        assert refined_while_idle(0.5) == 0
+        assert refined_while_idle(60) > 0
+        assert refined_while_idle(90) == 0
+        # A file that is not used changes nothing either.
+        session.add_extracted(unreadable)
+        assert refined_while_idle(60) == 0
+        added = session.add_extracted(described(orbit, 6))
+        own = [event for event in heard if isinstance(event, ModelRefined)]
+        assert [event for event in added.events if isinstance(event, ModelRefined)] == own
+        assert added.seconds.get("refine", 0) == pytest.approx(sum(event.seconds for event in own))
+        assert refined_while_idle(60) > 0
+
+
+@pytest.mark.slow
+def test_the_report_has_the_latencies_that_listeners_heard(tmp_path):
+    heard: list[Event] = []
+    small = options(max_image_size=400)
+    with Session(tmp_path / "out", small, on_event=heard.append) as session:
+        for photo in sorted((VILLAGE / "images").iterdir())[:4]:
+            session.add(photo)
+        totals = session.finish().summary.totals
+    latencies = [event.latency_s for event in heard if isinstance(event, PhotoPlaced)]
+    assert len(latencies) == totals.num_registered > 0
+    assert totals.latency == Latency.of(latencies)
+
+
 def test_reports_are_written(session):
     output, steps, _ = session
     lines = (output / "retrieval.jsonl").read_text(encoding="utf-8").splitlines()
@@ -222,13 +262,22 @@ def test_two_places_give_two_models_the_largest_first(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_the_database_does_not_depend_on_the_threads(orbit, session, tmp_path, threads):
+def test_with_one_thread_the_database_is_the_same_to_the_bit(orbit, session, tmp_path):
     output, _, _ = session
-    with Session(tmp_path / "out", options(threads)) as other:
+    with Session(tmp_path / "out", options()) as other:
         for index in range(NUM_PHOTOS):
             other.add_extracted(described(orbit, index))
     assert tables(tmp_path / "out" / "database.db") == tables(output / "database.db")
+
+
+def test_with_more_threads_the_models_are_as_true(orbit, tmp_path):
+    """Refinement runs beside the photos then, and guides the matching of those that follow."""
+    with Session(tmp_path / "out", options(2)) as session:
+        for index in range(NUM_PHOTOS):
+            session.add_extracted(described(orbit, index))
+        models = session.finish().models
+    assert [model.num_registered for model in models] == [NUM_PHOTOS]
+    assert position_errors_m(models[0].reconstruction, orbit).max() < POSITION_TOLERANCE_M
 
 
 def test_with_one_thread_the_models_are_the_same_to_the_bit(orbit, tmp_path):
