@@ -155,7 +155,8 @@ def _draw_moment(draw: np.random.Generator, within_s: float) -> Moment:
         after_s=float(draw.uniform(0.0, within_s)),
         fault=_FAULTS[draw.integers(len(_FAULTS))],
         aim=_AIMS[draw.integers(len(_AIMS))],
-        room_bytes=int(draw.integers(_MAX_ROOM_BYTES)),
+        # Logs are small, models larger, the database is the largest.
+        room_bytes=int(_MAX_ROOM_BYTES ** draw.uniform()),
     )
 
 
