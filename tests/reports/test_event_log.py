@@ -25,7 +25,7 @@ def test_a_torn_line_of_a_killed_process_is_dropped(tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's always full device")
 def test_a_full_disk_is_told():
-    log = EventLog(Path("/dev/full").open("w", encoding="utf-8"))
+    log = EventLog(Path("/dev/full").open("w", encoding="utf-8"))  # noqa: SIM115
     with pytest.raises(StorageError, match=r"events\.jsonl: .*No space left"):
         log.write(PhotoArrived("a.jpg"))
     log.close()

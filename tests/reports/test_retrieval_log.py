@@ -81,7 +81,7 @@ def test_lines_of_earlier_versions_have_no_reasons(tmp_path):
 def test_a_full_disk_is_told(tmp_path):
     log = RetrievalLog(tmp_path)
     log._file.close()
-    log._file = Path("/dev/full").open("a", encoding="utf-8")
+    log._file = Path("/dev/full").open("a", encoding="utf-8")  # noqa: SIM115
     with pytest.raises(StorageError, match=r"retrieval\.jsonl: .*No space left"):
         log.add(PhotoAdded("a.jpg", 1))
     log.close()
