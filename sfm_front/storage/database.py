@@ -275,7 +275,10 @@ class PhotoDatabase(Closeable):
         """Wait while another program writes, and say so."""
         if not self._path.exists():
             # SQLite would go on to write to a file that no longer has a name.
-            raise StorageError(f"{self._path}: was removed while it was written to.")
+            raise StorageError(
+                f"{self._path}: was removed while it was written to. Begin anew with the same "
+                "command."
+            )
         until = time.monotonic() + _LOCK_PATIENCE_S
         waiting = False
         while True:

@@ -106,7 +106,7 @@ def violations(output: Path, photos: Collection[Acknowledged] | None = None) -> 
     with TemporaryDirectory(prefix="sfm_front_oracle_") as scratch:
         # Opening recovers it, which is the next run's to do.
         database = copy_database(output, Path(scratch))
-        found += _database_violations(database, expected)
+        found += database_violations(database, expected)
         view = colmap_view(database, output / "sparse")
     return [*found, *view.broken, *_model_violations(output / "sparse", view)]
 
@@ -125,7 +125,8 @@ def stored_photos(database: Path) -> dict[int, str]:
         return dict(opened.execute("SELECT image_id, name FROM images ORDER BY image_id"))
 
 
-def _database_violations(database: Path, expected: Collection[Acknowledged]) -> list[str]:
+def database_violations(database: Path, expected: Collection[Acknowledged]) -> list[str]:
+    """What is wrong with a database; ``expected`` photos must be in it. Opening it recovers it."""
     if not database.exists():
         return [f"no database, but {len(expected)} photos acknowledged"] if expected else []
     try:

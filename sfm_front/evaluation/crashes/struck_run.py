@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import time
 from collections.abc import Sequence
@@ -80,6 +81,8 @@ def run(command: Sequence[str], output: Path, num_photos: int, moment: Moment | 
         text=True,
         errors="replace",
         env=module_environment(),
+        # What runs in the background of a script starts with Ctrl-C ignored, and hands that on.
+        preexec_fn=_heed_ctrl_c,
     ) as process:
         try:
             phase = None
@@ -98,6 +101,10 @@ def run(command: Sequence[str], output: Path, num_photos: int, moment: Moment | 
         begun[-1]["num_photos"] if len(begun) > sessions else None,
         time.monotonic() - started,
     )
+
+
+def _heed_ctrl_c() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _await(process: subprocess.Popen[str], output: Path, started: float, moment: Moment) -> bool:
