@@ -60,7 +60,7 @@ def cut_at_random(
     cuts = Cuts(scene.name)
     copy = output.with_name("copy")
     while len(cuts.num_photos) < num_cuts:
-        shutil.rmtree(output)
+        shutil.rmtree(output, ignore_errors=True)
         after_s = float(draw.uniform(0.0, whole.wall_seconds))
         if not _copy_while_it_runs(command, output, copy, after_s):
             continue
