@@ -21,8 +21,6 @@ from sfm_front.types import ModelSummary, Uint8Array
 STATE = "session.json"
 """What a session knows beside its models, in their folder."""
 
-# Free space from which a model is taken to be whole without reading it back.
-_ROOM = 64 * 2**20
 logger = logging.getLogger(__name__)
 
 # What C++ takes for white space: COLMAP reads a name in a text model up to the first of it.
@@ -116,18 +114,40 @@ def _beside(folder: Path) -> tuple[Path, Path]:
     return folder.with_name(folder.name + ".new"), folder.with_name(folder.name + ".old")
 
 
-def _check_written(reconstruction: pycolmap.Reconstruction, model: Path) -> None:
-    """pycolmap does not tell that the disk was full: read back if it may have been."""
-    written = sum(file.stat().st_size for file in model.iterdir())
-    if shutil.disk_usage(model).free > max(written, _ROOM):
-        return
-    try:
-        found = pycolmap.Reconstruction(model)
-        whole = found.num_points3D() == reconstruction.num_points3D()
-    except (ValueError, RuntimeError, IndexError, MemoryError):
-        whole = False
+def _check_written(model: pycolmap.Reconstruction, folder: Path) -> None:
+    """pycolmap does not tell when a disk or a quota was full: compare what there should be.
+
+    The small files are written before the large ones and would not have fitted less.
+    """
+    # colmap.github.io/format.html, and 15 bytes a point in a PLY file.
+    images = 8 + sum(
+        4 + 56 + 4 + len(os.fsencode(image.name)) + 1 + 8 + 24 * len(image.points2D)
+        for image in map(model.image, model.reg_image_ids())
+    )
+    points = 8 + 51 * model.num_points3D() + 8 * model.compute_num_observations()
+    whole = _size(folder / "images.bin") == images and _size(folder / "points3D.bin") == points
+    cloud = folder / "points3D.ply"
+    if whole and cloud.exists():
+        _, end, data = cloud.read_bytes().partition(b"end_header\n")
+        whole = bool(end) and len(data) == 15 * model.num_points3D()
+    if whole and (folder / "points3D.txt").exists():
+        whole = _is_whole_text(model, folder)
     if not whole:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _size(file: Path) -> int:
+    return file.stat().st_size if file.exists() else 0
+
+
+def _is_whole_text(model: pycolmap.Reconstruction, folder: Path) -> bool:
+    found = pycolmap.Reconstruction()
+    try:
+        found.read_text(folder)
+    except (ValueError, RuntimeError, IndexError, MemoryError):
+        return False
+    same_points = found.num_points3D() == model.num_points3D()
+    return same_points and found.compute_num_observations() == model.compute_num_observations()
 
 
 def _sync_all(folder: Path) -> None:

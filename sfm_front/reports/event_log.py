@@ -22,12 +22,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime, timezone
 from enum import Enum
 from pathlib import Path
 from typing import IO, Any
 
+from sfm_front.errors import StorageError
 from sfm_front.events import (
     Event,
     ModelDropped,
@@ -76,12 +78,17 @@ class EventLog(Closeable):
         return cls(file.open("a", encoding="utf-8"))
 
     def write(self, event: Event) -> None:
-        """Write an event."""
-        self._stream.write(as_line(event) + "\n")
-        self._stream.flush()
+        """Write an event. Raises StorageError where it cannot be written."""
+        try:
+            self._stream.write(as_line(event) + "\n")
+            self._stream.flush()
+        except OSError as error:
+            raise StorageError(f"{FILE}: cannot be written ({error.strerror}).") from error
 
     def close(self) -> None:
-        self._stream.close()
+        # Fails only for a line of which ``write`` has told already.
+        with suppress(OSError):
+            self._stream.close()
 
 
 def as_line(event: Event, now: Callable[[], datetime] | None = None) -> str:

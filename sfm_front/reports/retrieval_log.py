@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from sfm_front.errors import StorageError
 from sfm_front.events import PhotoAdded
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.storage.atomic import write_atomically
@@ -26,12 +28,17 @@ class RetrievalLog(Closeable):
         self._file = file.open("a", encoding="utf-8")
 
     def add(self, photo: PhotoAdded) -> None:
-        """Write a photo's line."""
-        self._file.write(_line(photo.name, photo.candidates))
-        self._file.flush()
+        """Write a photo's line. Raises StorageError where it cannot be written."""
+        try:
+            self._file.write(_line(photo.name, photo.candidates))
+            self._file.flush()
+        except OSError as error:
+            raise StorageError(f"{FILE}: cannot be written ({error.strerror}).") from error
 
     def close(self) -> None:
-        self._file.close()
+        # Fails only for a line of which ``add`` has told already.
+        with suppress(OSError):
+            self._file.close()
 
 
 def read_candidates(output: Path, name: str) -> tuple[CandidateOutcome, ...]:

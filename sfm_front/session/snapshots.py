@@ -12,7 +12,7 @@ from typing import Any
 
 import pycolmap
 
-from sfm_front.errors import InputError
+from sfm_front.errors import InputError, StorageError
 from sfm_front.exporters.colmap import STATE, export_models, recover_models
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.storage.colmap_models import read_model
@@ -55,7 +55,16 @@ class Snapshots:
         final: bool = False,
         text: bool = False,
     ) -> list[ModelSummary]:
-        """Write all models, whole or not at all; ``final`` ones with their point clouds."""
+        """Write all models, whole or not at all; ``final`` ones with their point clouds.
+
+        Raises StorageError if the disk is full, or the output was removed.
+        """
+        if not self._folder.parent.is_dir():
+            # Else it would be made anew, with models but without what a session goes on from.
+            raise StorageError(
+                f"{self._folder.parent}: was removed while it was written to. Begin anew with the "
+                "same command."
+            )
         started = time.monotonic()
         summaries = export_models(
             [model.reconstruction for model in models],

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import RLock
 from typing import Any
 
@@ -19,7 +20,7 @@ import pycolmap
 
 from sfm_front.errors import StorageError
 from sfm_front.runtime.closeable import Closeable
-from sfm_front.storage.atomic import sync
+from sfm_front.storage.atomic import write_atomically
 from sfm_front.storage.colmap_rows import (
     PAIR_COLUMNS,
     Row,
@@ -84,10 +85,7 @@ class PhotoDatabase(Closeable):
         self._path = path
         self._lock = RLock()
         if not path.exists():
-            # COLMAP's tables are COLMAP's to define.
-            pycolmap.Database.open(path).close()
-            sync(path)
-            sync(path.parent)
+            _create(path)
         with self._errors():
             self._connection = sqlite3.connect(
                 path, timeout=_LOCK_POLL_S, isolation_level=None, check_same_thread=False
@@ -277,6 +275,12 @@ class PhotoDatabase(Closeable):
 
     def _begin(self) -> None:
         """Wait while another program writes, and say so."""
+        if not self._path.exists():
+            # SQLite would go on to write to a file that no longer has a name.
+            raise StorageError(
+                f"{self._path}: was removed while it was written to. Begin anew with the same "
+                "command."
+            )
         until = time.monotonic() + _LOCK_PATIENCE_S
         waiting = False
         while True:
@@ -317,6 +321,19 @@ class PhotoDatabase(Closeable):
             yield
         except sqlite3.Error as error:
             raise StorageError(f"{self._path}: {error}. {_what_now(error)}") from error
+
+
+def _create(path: Path) -> None:
+    """An empty database, whole or not at all: COLMAP commits its tables one by one."""
+    with TemporaryDirectory(prefix="sfm_front_") as folder:
+        empty = Path(folder) / path.name
+        try:
+            # COLMAP's tables are COLMAP's to define.
+            pycolmap.Database.open(empty).close()
+            content = empty.read_bytes()
+        except (RuntimeError, OSError) as error:
+            raise StorageError(f"{folder}: COLMAP cannot write there. Make room.") from error
+    write_atomically(path, lambda file: file.write(content))
 
 
 def _what_now(error: sqlite3.Error) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+from contextlib import suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -29,7 +30,9 @@ class SessionLock(Closeable):
                 f"{output}: {self._owner()} is writing to it. Wait for it, or give another "
                 "--output."
             ) from None
-        (output / OWNER).write_text(f"process {os.getpid()} on {socket.gethostname()}")
+        # The lock holds without a name, too, as on a full disk.
+        with suppress(OSError):
+            (output / OWNER).write_text(f"process {os.getpid()} on {socket.gethostname()}")
 
     def _owner(self) -> str:
         try:
@@ -38,6 +41,12 @@ class SessionLock(Closeable):
             return "another process"
 
     def close(self) -> None:
-        (self._output / OWNER).unlink(missing_ok=True)
+        with suppress(OSError):
+            (self._output / OWNER).unlink()
+        if os.name == "nt":
+            self._lock.release()
+        # Elsewhere before the release: after it, the file may be another process's lock. Windows
+        # does not remove a file that is open.
+        with suppress(OSError):
+            (self._output / LOCK).unlink()
         self._lock.release()
-        (self._output / LOCK).unlink(missing_ok=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from helpers.photo_stream import centre_of, true_matches
 
 from sfm_front.errors import StorageError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.exporters import colmap
 from sfm_front.exporters.colmap import (
     export_models,
     first_name_lost_in_text,
@@ -209,18 +207,25 @@ def test_what_a_kill_between_the_moves_leaves_is_completed(orbit, tmp_path, kill
     assert [path.name for path in tmp_path.iterdir()] == ["sparse"]
 
 
-def test_models_cut_short_by_a_full_disk_are_noticed(orbit, tmp_path, monkeypatch):
-    """pycolmap does not tell. Free space is what makes us look."""
-    write = pycolmap.Reconstruction.write_binary
+@pytest.mark.parametrize(
+    ("writer", "file"),
+    [
+        ("write_binary", "images.bin"),
+        ("write_binary", "points3D.bin"),
+        ("export_PLY", "points3D.ply"),
+        ("write_text", "points3D.txt"),
+    ],
+)
+def test_models_cut_short_are_noticed(orbit, tmp_path, monkeypatch, writer, file):
+    """pycolmap does not tell; where a quota is full, nor does the disk's free space."""
+    write = getattr(pycolmap.Reconstruction, writer)
 
-    def cut(model: pycolmap.Reconstruction, folder: Path) -> None:
-        write(model, folder)
-        file = folder / "points3D.bin"
-        file.write_bytes(file.read_bytes()[:-100])
+    def cut(model: pycolmap.Reconstruction, target: Path) -> None:
+        write(model, target)
+        written = target if target.name == file else target / file
+        written.write_bytes(written.read_bytes()[:-100])
 
-    monkeypatch.setattr(pycolmap.Reconstruction, "write_binary", cut)
-    usage = shutil.disk_usage(tmp_path)._replace(free=0)
-    monkeypatch.setattr(colmap.shutil, "disk_usage", lambda _: usage)
+    monkeypatch.setattr(pycolmap.Reconstruction, writer, cut)
     with pytest.raises(StorageError, match="No space left"):
-        export_models([make_model(orbit, 2)], colors_of(orbit, 2), tmp_path / "sparse")
+        export_models([make_model(orbit, 2)], colors_of(orbit, 2), tmp_path / "sparse", text=True)
     assert not (tmp_path / "sparse").exists()

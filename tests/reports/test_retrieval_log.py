@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
+import pytest
+
+from sfm_front.errors import StorageError
 from sfm_front.events import PhotoAdded
 from sfm_front.reports.retrieval_log import RetrievalLog, read_candidates
 from sfm_front.types import CandidateOutcome, Rejected, Rejection
@@ -71,3 +75,13 @@ def test_lines_of_earlier_versions_have_no_reasons(tmp_path):
     line = {"name": "b.jpg", "most_relevant": "a.jpg", "candidates": [row]}
     (tmp_path / "retrieval.jsonl").write_text(json.dumps(line) + "\n", encoding="utf-8")
     assert read_candidates(tmp_path, "b.jpg") == (CandidateOutcome("a.jpg", 0.5, 20, False, None),)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's always full device")
+def test_a_full_disk_is_told(tmp_path):
+    log = RetrievalLog(tmp_path)
+    log._file.close()
+    log._file = Path("/dev/full").open("a", encoding="utf-8")  # noqa: SIM115
+    with pytest.raises(StorageError, match=r"retrieval\.jsonl: .*No space left"):
+        log.add(PhotoAdded("a.jpg", 1))
+    log.close()

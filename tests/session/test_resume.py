@@ -16,7 +16,7 @@ import pytest
 from helpers.locations import ROOT, TESTS
 from helpers.photo_stream import described, position_errors_m
 
-from sfm_front.errors import InputError
+from sfm_front.errors import InputError, StorageError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import Event, ModelStarted, PhotoAdded, SessionStarted
 from sfm_front.session import snapshots
@@ -186,6 +186,18 @@ def test_what_a_kill_or_damage_left_is_gone_on_with(orbit, photos, killed, tmp_p
     events = [json.loads(line) for line in (output / "events.jsonl").read_text().splitlines()]
     added = [event["name"] for event in events if event["event"] == "photo_added"]
     assert added == [orbit.name(index) for index in range(NUM_PHOTOS)]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not remove open files")
+def test_an_output_that_was_removed_is_not_made_anew_in_part(photos, tmp_path):
+    output = tmp_path / "out"
+    with Session(output, options()) as session:
+        for photo in photos[:7]:
+            session.add_extracted(photo)
+        shutil.rmtree(output)
+        with pytest.raises(StorageError, match="was removed"):
+            session.finish()
+    assert not output.exists()
 
 
 def test_other_options_are_refused_by_name(photos, tmp_path):

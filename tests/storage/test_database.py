@@ -373,3 +373,30 @@ def test_a_full_disk_is_told_and_leaves_nothing_of_the_photo(orbit, tmp_path):
         store._connection.execute("PRAGMA max_page_count=1000000")
         store.write(2, described(orbit, 1), orbit.camera, [])
         assert [photo.image_id for photo in store.photos()] == [1, 2]
+
+
+def test_a_database_that_could_not_be_made_is_not_there(orbit, tmp_path, monkeypatch):
+    """COLMAP commits its tables one by one: a kill in between must not leave some of them."""
+    open_database = pycolmap.Database.open
+
+    def stopped(file: os.PathLike[str]) -> None:
+        open_database(file).close()
+        raise RuntimeError("No registered database factory succeeded.")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(pycolmap.Database, "open", stopped)
+        with pytest.raises(StorageError, match="COLMAP cannot write there"):
+            PhotoDatabase(tmp_path / "database.db")
+    assert list(tmp_path.iterdir()) == []
+    with PhotoDatabase(tmp_path / "database.db") as store:
+        store.write(1, described(orbit, 0), orbit.camera, [])
+
+
+def test_a_database_that_was_removed_is_not_written_to(orbit, tmp_path):
+    if os.name == "nt":
+        pytest.skip("Windows does not remove open files")
+    file = tmp_path / "database.db"
+    with PhotoDatabase(file) as store:
+        file.unlink()
+        with pytest.raises(StorageError, match="was removed"):
+            store.write(1, described(orbit, 0), orbit.camera, [])

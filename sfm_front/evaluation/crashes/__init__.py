@@ -1,0 +1,1 @@
+"""Runs stopped at random moments, and what must hold after each."""

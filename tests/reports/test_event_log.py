@@ -1,0 +1,31 @@
+"""events.jsonl: whole lines, and what happens where none can be written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sfm_front.errors import StorageError
+from sfm_front.events import PhotoArrived
+from sfm_front.reports.event_log import FILE, EventLog
+
+
+def test_a_torn_line_of_a_killed_process_is_dropped(tmp_path):
+    with EventLog.in_folder(tmp_path) as log:
+        log.write(PhotoArrived("a.jpg"))
+    with (tmp_path / FILE).open("a", encoding="utf-8") as file:
+        file.write('{"v": 1, "time": "20')
+    with EventLog.in_folder(tmp_path) as log:
+        log.write(PhotoArrived("b.jpg"))
+    lines = (tmp_path / FILE).read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["name"] for line in lines] == ["a.jpg", "b.jpg"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's always full device")
+def test_a_full_disk_is_told():
+    log = EventLog(Path("/dev/full").open("w", encoding="utf-8"))  # noqa: SIM115
+    with pytest.raises(StorageError, match=r"events\.jsonl: .*No space left"):
+        log.write(PhotoArrived("a.jpg"))
+    log.close()
