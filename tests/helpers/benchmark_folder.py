@@ -55,7 +55,7 @@ photos = (
     photo("1.jpg", {{"sift": 1.0}}),
 )
 by_stage = {{"sift": 1.5, "map": 0.25, "finish": 0.125}}
-totals = Totals(3, 2, 0, 0, None, 1.0, by_stage, (), None)
+totals = Totals(3, 2, 0, 0, None, 1.0, by_stage, (), None, None)
 write_report(output, RunSummary(photos, (), {{}}, (), totals))
 (output / "arguments.json").write_text(json.dumps(sys.argv[1:]))
 """
