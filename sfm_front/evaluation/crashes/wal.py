@@ -10,8 +10,8 @@ from pathlib import Path
 
 HEADER_BYTES = 32
 _FRAME_HEADER_BYTES = 24
-# In the file of shared memory, nBackfillAttempted: frames that are being moved into the database, or
-# have been (sqlite.org/walformat.html#the_wal_index_header).
+# In the file of shared memory, nBackfillAttempted: frames that are being moved into the database,
+# or have been (sqlite.org/walformat.html#the_wal_index_header).
 _NUM_MOVED_AT = 128
 
 
