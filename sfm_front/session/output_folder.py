@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sfm_front.errors import InputError
+from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.session_lock import SessionLock
 
 _MARKER = "retrieval.jsonl"
@@ -82,6 +83,7 @@ def open_output_folder(output: Path, *, overwrite: bool, resume: bool = False) -
     try:
         if overwrite:
             _clear(output)
+        _remove_partial(output)
     except OSError as error:
         lock.close()
         raise _unwritable(output, error) from error
@@ -101,6 +103,13 @@ def _clear(output: Path) -> None:
     for name in _FILES:
         if name != _MARKER:
             (output / name).unlink(missing_ok=True)
+
+
+def _remove_partial(output: Path) -> None:
+    """Remove what killed processes had begun to write; only for who holds the lock."""
+    for path in output.iterdir():
+        if any(is_partial(path.name, name) for name in _FILES) and _is_own_file(path):
+            path.unlink()
 
 
 def _unwritable(output: Path, error: OSError) -> InputError:
@@ -129,7 +138,8 @@ def _foreign(output: Path) -> Iterator[Path]:
             yield folder
             continue
         for model in folder.iterdir():
-            if model.name == _STATE and _is_own_file(model):
+            is_state = model.name == _STATE or is_partial(model.name, _STATE)
+            if is_state and _is_own_file(model):
                 continue
             if model.is_symlink() or not model.is_dir() or not _MODEL_NAME.fullmatch(model.name):
                 yield model

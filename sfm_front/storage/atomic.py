@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -36,6 +37,11 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"{path}: cannot be written ({reason}). Give another place.") from error
+
+
+def is_partial(name: str, of: str) -> bool:
+    """Whether a file of this name is what a process killed in writing ``of`` left beside it."""
+    return re.fullmatch(rf"\.{re.escape(of)}\.[a-z0-9_]{{8}}", name) is not None
 
 
 def sync(path: Path) -> None:

@@ -12,6 +12,7 @@ from helpers.locations import ROOT
 
 from sfm_front.errors import InputError
 from sfm_front.session.output_folder import check_output_folder, open_output_folder
+from sfm_front.storage.atomic import write_atomically
 
 
 def opened_and_closed(output: Path, *, overwrite: bool) -> None:
@@ -146,3 +147,28 @@ def test_the_lock_of_a_killed_process_is_free(tmp_path):
     )
     assert killed.returncode == 9
     open_output_folder(finished(tmp_path), overwrite=False, resume=True).close()
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_what_a_kill_left_half_written_is_no_stranger(tmp_path, monkeypatch, overwrite):
+    """Neither a file of the folder nor what is beside the models."""
+    output = finished(tmp_path)
+    (output / "sparse.new").mkdir()
+
+    class Killed(BaseException):
+        pass
+
+    def killed(_: object) -> None:
+        raise Killed
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", lambda *_, **__: None)
+        for file in (output / "retrieval.jsonl", output / "sparse.new" / "session.json"):
+            with pytest.raises(Killed):
+                write_atomically(file, killed)
+    left = [path for path in output.rglob(".*") if path.is_file()]
+    assert len(left) == 2
+    kept = put(output / ".retrieval.jsonl.kept")
+    open_output_folder(output, overwrite=overwrite, resume=not overwrite).close()
+    assert not any(path.exists() for path in left if path.parent == output)
+    assert kept.exists()

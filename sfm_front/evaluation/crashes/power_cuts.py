@@ -98,7 +98,10 @@ def _copy_while_it_runs(command: Sequence[str], output: Path, copy: Path, after_
             started = time.monotonic()
             while process.poll() is None and time.monotonic() - started < after_s:
                 time.sleep(0.01)
+            if process.poll() is not None:
+                return False
             process.send_signal(signal.SIGSTOP)
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
             there = (output / _WAL).exists() and (output / _WAL).stat().st_size > HEADER_BYTES
             for name in (DATABASE, _WAL, _SHARED_MEMORY, EVENTS):
                 if there:

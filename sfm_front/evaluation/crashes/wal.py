@@ -10,9 +10,9 @@ from pathlib import Path
 
 HEADER_BYTES = 32
 _FRAME_HEADER_BYTES = 24
-# In the file of shared memory: how many frames have been moved into the database
-# (sqlite.org/walformat.html#the_wal_index_header).
-_NUM_MOVED_AT = 96
+# In the file of shared memory, nBackfillAttempted: frames that are being moved into the database,
+# or have been (sqlite.org/walformat.html#the_wal_index_header).
+_NUM_MOVED_AT = 128
 
 
 def commit_ends(wal: Path) -> list[int]:
@@ -34,7 +34,7 @@ def commit_ends(wal: Path) -> list[int]:
 
 
 def moved_until(wal: Path, shared_memory: Path) -> int:
-    """The offset up to which the log has been moved into the database, after it was synced."""
+    """The offset up to which the log may have been moved into the database, after it was synced."""
     page_bytes = struct.unpack_from(">I", wal.read_bytes(), 8)[0]
     num_moved = struct.unpack_from("=I", shared_memory.read_bytes(), _NUM_MOVED_AT)[0]
     return HEADER_BYTES + int(num_moved) * (_FRAME_HEADER_BYTES + int(page_bytes))
