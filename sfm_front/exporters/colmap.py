@@ -39,13 +39,13 @@ def export_models(
     *,
     text: bool = False,
     point_clouds: bool = True,
-    state: object | None = None,
+    state: Mapping[str, object] | None = None,
 ) -> list[ModelSummary]:
     """Colour models and write them to ``folder/0``, ``folder/1``, … in the order given.
 
     ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form,
-    ``point_clouds`` PLY files, ``state`` a JSON file with this content beside the models. A model
-    with a photo whose name text cannot keep gets none: a warning names the photo.
+    ``point_clouds`` PLY files, ``state`` a JSON file with this content and the files' sizes. A
+    model with a photo whose name text cannot keep gets no text: a warning names the photo.
     Everything is written beside ``folder`` first, synced, and then moved into place, so that a
     crash leaves either the models that were there or the new ones, never a part. If it happens
     between the two moves, ``recover_models`` completes them. Raises StorageError if the disk is
@@ -76,7 +76,7 @@ def _export(
     folder: Path,
     text: bool,
     point_clouds: bool,
-    state: object | None,
+    state: Mapping[str, object] | None,
 ) -> list[ModelSummary]:
     fresh, _ = _beside(folder)
     shutil.rmtree(fresh, ignore_errors=True)
@@ -103,7 +103,7 @@ def _export(
             )
         )
     if state is not None:
-        write_json(fresh / STATE, state)
+        write_json(fresh / STATE, {**state, "files": _file_sizes(fresh)})
     _sync_all(fresh)
     _replace(folder)
     return summaries
@@ -134,6 +134,20 @@ def _check_written(model: pycolmap.Reconstruction, folder: Path) -> None:
         whole = _is_whole_text(model, folder)
     if not whole:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def damaged_file(folder: Path, sizes: Mapping[str, int]) -> str | None:
+    """The first file below ``folder`` whose size is not that in ``sizes``; None if all are whole.
+
+    Asked before pycolmap reads a model: of one cut short it may read for ever.
+    """
+    return next((name for name, size in sizes.items() if _size(folder / name) != size), None)
+
+
+def _file_sizes(folder: Path) -> dict[str, int]:
+    return {
+        file.relative_to(folder).as_posix(): _size(file) for file in sorted(folder.rglob("*.bin"))
+    }
 
 
 def _size(file: Path) -> int:

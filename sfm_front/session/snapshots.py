@@ -13,7 +13,7 @@ from typing import Any
 import pycolmap
 
 from sfm_front.errors import InputError, StorageError
-from sfm_front.exporters.colmap import STATE, export_models, recover_models
+from sfm_front.exporters.colmap import STATE, damaged_file, export_models, recover_models
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.types import ModelSummary, Uint8Array
@@ -92,6 +92,9 @@ def read_snapshot(folder: Path) -> Snapshot | None:
             raise ValueError(f"version {content['version']}")
         states = [ModelState(**state) for state in content["models"]]
         num_photos = int(content["num_photos"])
+        damaged = damaged_file(folder, content["files"])
+        if damaged is not None:
+            raise ValueError(f"{damaged} is not whole")
         models = tuple((read_model(folder / str(n)), state) for n, state in enumerate(states))
     except FileNotFoundError:
         return None

@@ -15,7 +15,7 @@ from sfm_front.errors import InputError
 from sfm_front.evaluation.crashes.faults import Fault
 from sfm_front.evaluation.crashes.oracle import acknowledged, violations
 from sfm_front.evaluation.crashes.struck_run import Aim, Moment, Outcome, run
-from sfm_front.evaluation.poses import auc, pose_errors
+from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG, auc, pose_errors
 from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene
 from sfm_front.storage.colmap_models import find_models, read_model
 
@@ -132,11 +132,14 @@ def compare(ended: Result, uninterrupted: Result) -> list[str]:
     found = []
     if lost := uninterrupted.registered - ended.registered:
         found.append(f"not registered after all: {', '.join(sorted(lost))}")
-    # At 5 degrees: at 1 degree two undisturbed runs on several threads differ by more.
-    if ended.auc and ended.auc[-1] < uninterrupted.auc[-1] - _AUC_TOLERANCE:
-        found.append(
-            f"pose AUC {100 * ended.auc[-1]:.1f}, undisturbed {100 * uninterrupted.auc[-1]:.1f}"
-        )
+    for threshold, after, before in zip(
+        AUC_THRESHOLDS_DEG, ended.auc, uninterrupted.auc, strict=False
+    ):
+        if after < before - _AUC_TOLERANCE:
+            found.append(
+                f"pose AUC at {threshold:g} degrees {100 * after:.1f}, undisturbed "
+                f"{100 * before:.1f}"
+            )
     return found
 
 
