@@ -6,7 +6,7 @@ import json
 import logging
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
@@ -14,51 +14,57 @@ from threading import Thread
 
 import pycolmap
 
+from sfm_front.mapping.mapper_options import MapperOptions
+from sfm_front.mapping.refinement_process import AdjustmentRequest
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.subprocess_env import module_environment
 
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, kw_only=True)
-class AdjustmentRequest:
-    """How a model is adjusted: relative change of the cost at which it stops, and so on."""
-
-    tolerance: float
-    iterations: int
-    num_threads: int
-    refine_intrinsics: bool
-
-
 class BackgroundAdjuster(Closeable):
-    """Adjusts one model at a time in another process, which starts with the first one."""
+    """Adjusts one model at a time in another process, which starts with the first one.
+
+    ``is_broken``: that process has died, and nothing can be adjusted any more.
+    """
 
     def __init__(self) -> None:
         self._folder = TemporaryDirectory(prefix="sfm_front_refinement_")
+        self._model = Path(self._folder.name) / "model"
         self._process: subprocess.Popen[str] | None = None
         self._answers: SimpleQueue[str] = SimpleQueue()
         self._is_busy = False
-        self._is_broken = False
+        self.is_broken = False
         self._ticket = 0
 
     @property
     def is_free(self) -> bool:
         """Whether it can take a model now."""
-        return not self._is_busy and not self._is_broken
+        return not self._is_busy and not self.is_broken
 
-    def submit(self, reconstruction: pycolmap.Reconstruction, request: AdjustmentRequest) -> int:
-        """Begin to adjust a copy of a model; returns a ticket for ``result``. It must be free."""
-        model = Path(self._folder.name) / "model"
-        model.mkdir(exist_ok=True)
-        reconstruction.write_binary(model)
+    def submit(self, reconstruction: pycolmap.Reconstruction, options: MapperOptions) -> int:
+        """Begin to adjust a copy of a model as it is adjusted while it grows.
+
+        Returns a ticket for ``result``. It must be free.
+        """
+        self._model.mkdir(exist_ok=True)
+        reconstruction.write_binary(self._model)
+        request = AdjustmentRequest(
+            model=str(self._model),
+            tolerance=options.convergence.global_tolerance,
+            iterations=options.convergence.global_iterations,
+            # The photos that come meanwhile need the others.
+            num_threads=max(1, options.num_threads // 2),
+            refine_intrinsics=options.refine_intrinsics,
+        )
         process = self._running()
         assert process.stdin is not None
         try:
-            process.stdin.write(json.dumps({"model": str(model), **vars(request)}) + "\n")
+            process.stdin.write(json.dumps(asdict(request)) + "\n")
             process.stdin.flush()
         except OSError:
             self._break()
-        self._is_busy = not self._is_broken
+        self._is_busy = not self.is_broken
         self._ticket += 1
         return self._ticket
 
@@ -81,7 +87,7 @@ class BackgroundAdjuster(Closeable):
         """The adjusted copy; None if it is still under way, failed, or another one came since."""
         if self._is_busy or ticket != self._ticket:
             return None
-        return pycolmap.Reconstruction(Path(self._folder.name) / "model")
+        return pycolmap.Reconstruction(self._model)
 
     def close(self) -> None:
         if self._process is not None:
@@ -111,6 +117,6 @@ class BackgroundAdjuster(Closeable):
         self._answers.put("")
 
     def _break(self) -> None:
-        """The process has died: refinements fall into the turn of a photo from now on."""
+        """The process has died: models are refined in the turn of a photo from now on."""
         logger.warning("the process that refines models has ended")
-        self._is_broken = True
+        self.is_broken = True

@@ -53,10 +53,19 @@ def adjust_robustly(
         options.large_tolerance if large else options.tolerance
     )
     adjustment.ceres.solver_options.num_threads = options.num_threads
+    adjust_all(reconstruction, adjustment)
+    reconstruction.update_point_3d_errors()
+
+
+def adjust_all(
+    reconstruction: pycolmap.Reconstruction, adjustment: pycolmap.BundleAdjustmentOptions
+) -> None:
+    """Adjust all registered photos and their points, two cameras fixing the gauge.
+
+    As ``pycolmap.bundle_adjustment``, which prints about it whatever the log level.
+    """
     config = pycolmap.BundleAdjustmentConfig()
     for image_id in reconstruction.reg_image_ids():
         config.add_image(image_id)
     config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    # pycolmap.bundle_adjustment does this too, and prints about it whatever the log level.
     pycolmap.create_default_bundle_adjuster(adjustment, config, reconstruction).solve()
-    reconstruction.update_point_3d_errors()

@@ -38,9 +38,9 @@ def carry_over(
     """Change a model that went on growing as refinement changed its copy.
 
     What both have moves as the copy did, on top of what has happened to it since. A photo that
-    was registered since moves with the first of its ``neighbors`` that the copy has, a new point
-    with the first photo of its track. ``neighbors``: image id → photos it has verified pairs with,
-    most inliers first.
+    was registered since moves with the first of its ``neighbors`` that moves, a new point with the
+    first photo of its track. ``neighbors``: image id of each such photo → those it has verified
+    pairs with, most inliers first.
     """
     moves = {
         i: refined.image(i).cam_from_world().inverse() * pose
@@ -49,7 +49,7 @@ def carry_over(
     }
     for image_id in live.reg_image_ids():
         if image_id not in moves:
-            anchors = (moves[i] for i in neighbors[image_id] if i in before.poses and i in moves)
+            anchors = (moves[i] for i in neighbors[image_id] if i in moves)
             moves[image_id] = next(anchors, pycolmap.Rigid3d())
     for image_id in live.reg_image_ids():
         image = live.image(image_id)

@@ -11,7 +11,7 @@ import numpy as np
 import pycolmap
 
 from sfm_front.events import Emit, ModelRefined
-from sfm_front.mapping.background_refinement import AdjustmentRequest, BackgroundAdjuster
+from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.calibration import (
     impossible_photos,
     is_miscalibrated,
@@ -207,8 +207,7 @@ class Model:
             for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
         # What is asked of the mapper from here on must be of the model that is handed out.
-        self._mapper.end_reconstruction(False)
-        self._mapper.begin_reconstruction(self.reconstruction)
+        self._begin_anew()
 
     @property
     def is_miscalibrated(self) -> bool:
@@ -244,24 +243,16 @@ class Model:
 
     def _refine_while_growing(self) -> None:
         adjuster = self._adjuster
-        if adjuster is None or self.num_registered < _SMALLEST_BACKGROUND:
+        if adjuster is not None:
+            adjuster.poll()
+        if adjuster is None or adjuster.is_broken or self.num_registered < _SMALLEST_BACKGROUND:
             self._refine(self._streaming)
-            return
-        adjuster.poll()
-        if not adjuster.is_free:
-            return  # it stays due
-        self._begin_anew()
-        self._mapper.complete_and_merge_tracks(self._triangulation)
-        convergence = self._options.convergence
-        request = AdjustmentRequest(
-            tolerance=convergence.global_tolerance,
-            iterations=convergence.global_iterations,
-            num_threads=max(1, self._options.num_threads // 2),
-            refine_intrinsics=self._options.refine_intrinsics,
-        )
-        before = Before.of(self.reconstruction)
-        self._under_way = adjuster.submit(self.reconstruction, request), before
-        self._note_refined()
+        elif adjuster.is_free:  # else it stays due
+            self._begin_anew()
+            self._mapper.complete_and_merge_tracks(self._triangulation)
+            before = Before.of(self.reconstruction)
+            self._under_way = adjuster.submit(self.reconstruction, self._options), before
+            self._note_refined()
 
     def _take_refined(self) -> None:
         """Carry over what refinement in the background has changed, if it has ended."""
@@ -276,7 +267,7 @@ class Model:
         started, centers = time.perf_counter(), self._centers()
         neighbors = {
             i: sorted(found, key=lambda j: -found[j])
-            for i in self.registered
+            for i in self.registered - before.poses.keys()
             for found in [self._view_graph.neighbors(i)]
         }
         carry_over(self.reconstruction, before, refined, neighbors)

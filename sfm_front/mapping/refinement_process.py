@@ -10,27 +10,40 @@ import json
 import os
 import sys
 import zlib  # noqa: F401  (before pycolmap)
+from dataclasses import dataclass
 
 import pycolmap
 
+from sfm_front.mapping.bundle_adjustment import adjust_all
 
-def adjust(request: dict[str, object]) -> None:
-    """Read the model in the folder ``model``, adjust it, and write it back."""
-    folder = str(request["model"])
-    reconstruction = pycolmap.Reconstruction(folder)
-    options = pycolmap.BundleAdjustmentOptions()
-    options.print_summary = False
-    options.refine_focal_length = options.refine_extra_params = bool(request["refine_intrinsics"])
-    solver = options.ceres.solver_options
-    solver.function_tolerance = float(str(request["tolerance"]))
-    solver.max_num_iterations = int(str(request["iterations"]))
-    solver.num_threads = int(str(request["num_threads"]))
-    config = pycolmap.BundleAdjustmentConfig()
-    for image_id in reconstruction.reg_image_ids():
-        config.add_image(image_id)
-    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    pycolmap.create_default_bundle_adjuster(options, config, reconstruction).solve()
-    reconstruction.write_binary(folder)
+
+@dataclass(frozen=True, kw_only=True)
+class AdjustmentRequest:
+    """Adjust the model in the folder ``model`` in place, with at most so many iterations.
+
+    ``tolerance``: relative change of the cost at which it stops.
+    """
+
+    model: str
+    tolerance: float
+    iterations: int
+    num_threads: int
+    refine_intrinsics: bool
+
+
+def adjust(request: AdjustmentRequest) -> None:
+    """Read the model, adjust it, and write it back."""
+    reconstruction = pycolmap.Reconstruction(request.model)
+    adjustment = pycolmap.BundleAdjustmentOptions()
+    adjustment.print_summary = False
+    adjustment.refine_focal_length = request.refine_intrinsics
+    adjustment.refine_extra_params = request.refine_intrinsics
+    solver = adjustment.ceres.solver_options
+    solver.function_tolerance = request.tolerance
+    solver.max_num_iterations = request.iterations
+    solver.num_threads = request.num_threads
+    adjust_all(reconstruction, adjustment)
+    reconstruction.write_binary(request.model)
 
 
 def main() -> None:
@@ -42,9 +55,9 @@ def main() -> None:
         os.nice(5)  # photos come first
     for line in sys.stdin:
         try:
-            adjust(json.loads(line))
+            adjust(AdjustmentRequest(**json.loads(line)))
             answer = "done"
-        except (ValueError, RuntimeError, OSError, KeyError) as error:
+        except (ValueError, RuntimeError, OSError, TypeError) as error:
             answer = f"failed: {error}".splitlines()[0]
         print(answer, file=answers, flush=True)
 

@@ -14,14 +14,20 @@ from helpers.photo_stream import SceneFeed, position_errors_m
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import ModelEvent, ModelRefined
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
-from sfm_front.mapping.background_refinement import AdjustmentRequest, BackgroundAdjuster
+from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.carry_over import Before, carry_over
 from sfm_front.mapping.finishing import finish
-from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
+from sfm_front.mapping.mapper_options import (
+    ConvergenceOptions,
+    InitialPairConstraints,
+    MapperOptions,
+)
 from sfm_front.mapping.model import Model
 
 NUM_PHOTOS = 16
-REQUEST = AdjustmentRequest(tolerance=1e-6, iterations=30, num_threads=1, refine_intrinsics=True)
+OPTIONS = MapperOptions(
+    num_threads=1, convergence=ConvergenceOptions(global_tolerance=1e-6, global_iterations=30)
+)
 # The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
 POSITION_TOLERANCE_M = 0.3
 PATIENCE_S = 60.0
@@ -52,7 +58,7 @@ def adjuster() -> Iterator[BackgroundAdjuster]:
 
 def wait_for(adjuster: BackgroundAdjuster) -> None:
     until = time.monotonic() + PATIENCE_S
-    while not adjuster.is_free and not adjuster._is_broken and time.monotonic() < until:
+    while not adjuster.is_free and not adjuster.is_broken and time.monotonic() < until:
         adjuster.poll()
         time.sleep(0.01)
 
@@ -74,14 +80,14 @@ def mean_error_px(model: pycolmap.Reconstruction) -> float:
 def test_a_copy_is_adjusted_in_another_process(grown, adjuster):
     off = shaken(grown)
     assert adjuster.is_free
-    ticket = adjuster.submit(off, REQUEST)
+    ticket = adjuster.submit(off, OPTIONS)
     assert not adjuster.is_free
     wait_for(adjuster)
     refined = adjuster.result(ticket)
     assert mean_error_px(off) > 2 * mean_error_px(grown)
     assert mean_error_px(refined) < 1.1 * mean_error_px(grown)
     # It takes the next one, and then the first has no result any more.
-    later = adjuster.submit(off, REQUEST)
+    later = adjuster.submit(off, OPTIONS)
     assert adjuster.result(later) is None
     wait_for(adjuster)
     assert adjuster.result(ticket) is None
@@ -89,7 +95,7 @@ def test_a_copy_is_adjusted_in_another_process(grown, adjuster):
 
 
 def test_a_process_that_dies_is_told_and_takes_no_more(grown, adjuster, caplog):
-    ticket = adjuster.submit(grown, REQUEST)
+    ticket = adjuster.submit(grown, OPTIONS)
     adjuster._process.kill()
     wait_for(adjuster)
     assert adjuster.result(ticket) is None
@@ -186,3 +192,25 @@ def test_photos_that_come_meanwhile_do_not_wait_and_the_model_is_as_true(orbit):
     assert [model.num_registered for model in atlas.models] == [NUM_PHOTOS]
     errors = position_errors_m(atlas.models[0].reconstruction, orbit)
     assert errors.max() < POSITION_TOLERANCE_M
+
+
+def test_without_the_process_models_are_refined_in_the_turn_of_a_photo(orbit):
+    events: list[ModelEvent] = []
+    feed = SceneFeed(orbit)
+    with BackgroundAdjuster() as adjuster:
+        adjuster.is_broken = True
+        options = AtlasOptions(mapper=MapperOptions(num_threads=2))
+        atlas = Atlas(feed.scene, options, events.append, adjuster)
+        for index in range(NUM_PHOTOS):
+            atlas.add(feed.add(index))
+        alone: list[ModelEvent] = []
+        again = SceneFeed(orbit)
+        expected = Atlas(again.scene, options, alone.append)
+        for index in range(NUM_PHOTOS):
+            expected.add(again.add(index))
+    refined, of_one = (
+        [event.num_registered for event in told if isinstance(event, ModelRefined)]
+        for told in (events, alone)
+    )
+    assert refined == of_one
+    assert max(refined) > 8
