@@ -121,7 +121,7 @@ def _check_written(model: pycolmap.Reconstruction, folder: Path) -> None:
     """
     # colmap.github.io/format.html, and 15 bytes a point in a PLY file.
     images = 8 + sum(
-        4 + 56 + 4 + len(os.fsencode(image.name)) + 1 + 8 + 24 * len(image.points2D)
+        4 + 56 + 4 + len(os.fsencode(image.name)) + 1 + 8 + 24 * image.num_points2D()
         for image in map(model.image, model.reg_image_ids())
     )
     points = 8 + 51 * model.num_points3D() + 8 * model.compute_num_observations()

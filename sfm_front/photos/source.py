@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from itertools import islice
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
 
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.photos.exif import read_exif
@@ -19,6 +19,7 @@ from sfm_front.types import PhotoPath
 
 logger = logging.getLogger(__name__)
 
+Item = TypeVar("Item")
 PhotoOrder = Literal["name", "time", "random"]
 
 _MOST_WARNINGS = 10
@@ -80,6 +81,13 @@ def folder_identity(folder: Path) -> tuple[int, int] | None:
     return next(iter(_identities(folder)), None)
 
 
+def shuffled(items: Iterable[Item], seed: int) -> list[Item]:
+    """In an order that ``seed`` alone determines."""
+    order = list(items)
+    random.Random(seed).shuffle(order)
+    return order
+
+
 def order_photos(
     photos: Iterable[PhotoPath], order: PhotoOrder = "name", *, seed: int = 0
 ) -> list[PhotoPath]:
@@ -89,8 +97,8 @@ def order_photos(
         raise ConfigError(f"order must be one of {', '.join(get_args(PhotoOrder))}, got {order}")
     by_name = sorted(photos, key=lambda photo: photo.name)
     if order == "random":
-        random.Random(seed).shuffle(by_name)
-    elif order == "time":
+        return shuffled(by_name, seed)
+    if order == "time":
         by_name.sort(key=_capture_time)
     return by_name
 

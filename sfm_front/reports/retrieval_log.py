@@ -6,13 +6,13 @@ import json
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from sfm_front.errors import StorageError
 from sfm_front.events import PhotoAdded
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.storage.atomic import write_atomically
-from sfm_front.types import CandidateOutcome, Rejected, Rejection, StoredPhoto
+from sfm_front.storage.photo_json import candidate_of_row, candidate_row
+from sfm_front.types import CandidateOutcome, StoredPhoto
 
 FILE = "retrieval.jsonl"
 
@@ -47,7 +47,7 @@ def read_candidates(output: Path, name: str) -> tuple[CandidateOutcome, ...]:
         for line in lines:
             content = json.loads(line)
             if content["name"] == name:
-                return tuple(_candidate(row) for row in content["candidates"])
+                return tuple(candidate_of_row(row) for row in content["candidates"])
     return ()
 
 
@@ -55,33 +55,6 @@ def _line(name: str, candidates: Sequence[CandidateOutcome]) -> str:
     content = {
         "name": name,
         "most_relevant": candidates[0].name if candidates else None,
-        "candidates": [_row(candidate) for candidate in candidates],
+        "candidates": [candidate_row(candidate) for candidate in candidates],
     }
     return json.dumps(content, ensure_ascii=False) + "\n"
-
-
-def _row(candidate: CandidateOutcome) -> dict[str, Any]:
-    rejected = candidate.rejected
-    return {
-        "name": candidate.name,
-        "cosine": round(candidate.cosine, 5),
-        "inliers": candidate.inliers,
-        "verified": candidate.verified,
-        "rejected": rejected
-        and {
-            "reason": rejected.reason.value,
-            "matches": rejected.num_matches,
-            "inliers": rejected.num_inliers,
-        },
-    }
-
-
-def _candidate(row: dict[str, Any]) -> CandidateOutcome:
-    why = row.get("rejected")  # absent in files of earlier versions
-    return CandidateOutcome(
-        row["name"],
-        row["cosine"],
-        row["inliers"],
-        row["verified"],
-        why and Rejected(Rejection(why["reason"]), why["matches"], why["inliers"]),
-    )

@@ -8,20 +8,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sfm_front.errors import InputError
+from sfm_front.exporters.colmap import STATE
+from sfm_front.reports import event_log, report_json, retrieval_log
 from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.session_lock import SessionLock
 
-_MARKER = "retrieval.jsonl"
+_MARKER = retrieval_log.FILE
 DATABASE = "database.db"
 _FILES = (
     DATABASE,
     "database.db-shm",
     "database.db-wal",
-    "events.jsonl",
-    "report.json",
+    event_log.FILE,
+    report_json.FILE,
     _MARKER,
 )
-_STATE = "session.json"
 _MODELS = ("sparse", "sparse.new", "sparse.old")
 _MODEL_NAME = re.compile(r"\d+")
 _MODEL_FILES = frozenset(
@@ -138,7 +139,7 @@ def _foreign(output: Path) -> Iterator[Path]:
             yield folder
             continue
         for model in folder.iterdir():
-            is_state = model.name == _STATE or is_partial(model.name, _STATE)
+            is_state = model.name == STATE or is_partial(model.name, STATE)
             if is_state and _is_own_file(model):
                 continue
             if model.is_symlink() or not model.is_dir() or not _MODEL_NAME.fullmatch(model.name):

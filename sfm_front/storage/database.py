@@ -9,7 +9,6 @@ import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import RLock
@@ -30,16 +29,14 @@ from sfm_front.storage.colmap_rows import (
     read_camera,
     read_pair,
 )
+from sfm_front.storage.photo_json import candidate_of_row, candidate_row, exif_of_row, exif_row
 from sfm_front.types import (
     CandidateOutcome,
-    Exif,
     ExtractedPhoto,
     Features,
     FileState,
-    GeoPosition,
+    Float32Array,
     PairGeometry,
-    Rejected,
-    Rejection,
     Skipped,
     SkipReason,
     StoredPhoto,
@@ -137,10 +134,12 @@ class PhotoDatabase(Closeable):
                         "width": photo.width,
                         "height": photo.height,
                         "digest": photo.digest,
-                        "exif": _exif_text(photo.exif),
+                        "exif": json.dumps(exif_row(photo.exif)),
                         "global_vector": photo.global_vector.tobytes(),
                         "colors": photo.features.colors.tobytes(),
-                        "candidates": _candidates_text(candidates),
+                        "candidates": json.dumps(
+                            [candidate_row(candidate) for candidate in candidates]
+                        ),
                         "seconds": json.dumps(photo.seconds),
                     },
                 )
@@ -189,9 +188,9 @@ class PhotoDatabase(Closeable):
                 width=row[6],
                 height=row[7],
                 digest=row[8],
-                exif=_exif(row[9]),
+                exif=exif_of_row(json.loads(row[9])),
                 global_vector=np.frombuffer(row[10], np.float32),
-                candidates=_candidates(row[11]),
+                candidates=tuple(map(candidate_of_row, json.loads(row[11]))),
                 seconds=json.loads(row[12]),
                 num_keypoints=row[13],
             )
@@ -211,27 +210,28 @@ class PhotoDatabase(Closeable):
 
     def features(self, image_id: int) -> Features:
         """Features of a photo. Raises KeyError if there is no such photo."""
+        keypoints, colors = self.keypoints(image_id)
+        rows = self._rows("SELECT data FROM descriptors WHERE image_id = ?", (image_id,))
+        descriptors = np.frombuffer(rows[0][0], np.uint8).reshape(len(keypoints), -1)
+        return Features(keypoints, descriptors, colors)
+
+    def keypoints(self, image_id: int) -> tuple[Float32Array, Uint8Array]:
+        """(N, 4) keypoints and (N, 3) colours of a photo, without its descriptors.
+
+        Raises KeyError if there is no such photo.
+        """
         rows = self._rows(
-            "SELECT k.rows, k.cols, k.data, d.data, p.colors FROM keypoints k "
-            "JOIN descriptors d USING (image_id) JOIN sfm_front_photos p USING (image_id) "
-            "WHERE image_id = ?",
+            "SELECT k.rows, k.cols, k.data, p.colors FROM keypoints k "
+            "JOIN sfm_front_photos p USING (image_id) WHERE image_id = ?",
             (image_id,),
         )
         if not rows:
             raise KeyError(image_id)
-        num, cols, keypoints, descriptors, colors = rows[0]
-        return Features(
+        num, cols, keypoints, colors = rows[0]
+        return (
             np.frombuffer(keypoints, np.float32).reshape(num, cols),
-            np.frombuffer(descriptors, np.uint8).reshape(num, -1),
             np.frombuffer(colors, np.uint8).reshape(num, 3),
         )
-
-    def colors(self, image_id: int) -> Uint8Array:
-        """(N, 3) uint8 RGB under each keypoint. Raises KeyError if there is no such photo."""
-        rows = self._rows("SELECT colors FROM sfm_front_photos WHERE image_id = ?", (image_id,))
-        if not rows:
-            raise KeyError(image_id)
-        return np.frombuffer(rows[0][0], np.uint8).reshape(-1, 3)
 
     def cameras(self) -> dict[int, pycolmap.Camera]:
         """Camera id → camera, as photos started with it."""
@@ -349,58 +349,3 @@ def _file(path: Path) -> dict[str, Any]:
     """Where a file is, and its state now; None if it is gone."""
     state = FileState.of(path)
     return {"path": os.fsencode(state.path), "size": state.size, "mtime_ns": state.mtime_ns}
-
-
-def _exif_text(exif: Exif) -> str:
-    position = exif.position
-    return json.dumps(
-        {
-            "make": exif.make,
-            "model": exif.model,
-            "focal_length_mm": exif.focal_length_mm,
-            "focal_length_35mm": exif.focal_length_35mm,
-            "captured_at": exif.captured_at and exif.captured_at.isoformat(),
-            "position": position
-            and [position.latitude_deg, position.longitude_deg, position.altitude_m],
-            "orientation": exif.orientation,
-        }
-    )
-
-
-def _exif(text: str) -> Exif:
-    content = json.loads(text)
-    captured_at, position = content["captured_at"], content["position"]
-    return Exif(
-        **{
-            **content,
-            "captured_at": captured_at and datetime.fromisoformat(captured_at),
-            "position": position and GeoPosition(*position),
-        }
-    )
-
-
-def _candidates_text(candidates: Sequence[CandidateOutcome]) -> str:
-    return json.dumps(
-        [
-            [
-                candidate.name,
-                candidate.cosine,
-                candidate.inliers,
-                candidate.verified,
-                (why := candidate.rejected)
-                and [why.reason.value, why.num_matches, why.num_inliers],
-            ]
-            for candidate in candidates
-        ]
-    )
-
-
-def _candidates(text: str) -> tuple[CandidateOutcome, ...]:
-    return tuple(
-        CandidateOutcome(name, cosine, inliers, verified, why and _rejected(*why))
-        for name, cosine, inliers, verified, why in json.loads(text)
-    )
-
-
-def _rejected(reason: str, num_matches: int | None, num_inliers: int) -> Rejected:
-    return Rejected(Rejection(reason), num_matches, num_inliers)

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from sfm_front.errors import ConfigError
+from sfm_front.photos.source import shuffled
 
 _T = TypeVar("_T")
-
-
-def _shuffled(photos: Sequence[_T], seed: int) -> list[_T]:
-    order = list(photos)
-    random.Random(seed).shuffle(order)
-    return order
 
 
 # Shuffles are those of ``reconstruct --order random --seed N``.
 _ARRANGEMENTS: dict[str, Callable[[Sequence[_T]], list[_T]]] = {
     "name": list,
-    "shuffle-1": lambda photos: _shuffled(photos, 1),
-    "shuffle-2": lambda photos: _shuffled(photos, 2),
+    "shuffle-1": lambda photos: shuffled(photos, 1),
+    "shuffle-2": lambda photos: shuffled(photos, 2),
     "half": lambda photos: list(photos[::2]),
 }
 
