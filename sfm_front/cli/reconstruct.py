@@ -179,7 +179,12 @@ def run(arguments: argparse.Namespace) -> int:
         arriving: Iterable[PhotoPath | NotYet]
         if arguments.watch:
             appearing = watch_photos(
-                folder, watch, exclude=output, stop=interrupted, note=progress.note
+                folder,
+                watch,
+                exclude=output,
+                stop=interrupted,
+                idle_s=lambda: session.idle_s,
+                note=progress.note,
             )
             arriving = newcomers.among(appearing, progress.note)
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
@@ -61,6 +62,7 @@ def watch_photos(
     *,
     exclude: Path | None = None,
     stop: Callable[[], bool] = lambda: False,
+    idle_s: Callable[[], float] = lambda: math.inf,
     note: Callable[[str], None] = lambda _: None,
 ) -> Generator[PhotoPath | NotYet, None, None]:
     """The photos that are there, in the order of ``list_photos``, then those that appear.
@@ -75,10 +77,11 @@ def watch_photos(
     changed or was taken. What takes longer is no harm: changes are noticed meanwhile.
 
     It ends once ``stop`` says so (``threading.Event().is_set`` will do), or after
-    ``options.idle_timeout_s``, and may be closed at any time. ``folder`` may be missing at the
-    start, or vanish and come back: it is waited for. ``note`` hears of that, and of photos that
-    were deleted or replaced before they were taken, in one line each. Raises InputError as
-    ``check_watchable`` does.
+    ``options.idle_timeout_s``, and may be closed at any time. That time does not run while whoever
+    takes the photos is busy with them: ``idle_s`` tells for how many seconds it has not been.
+    ``folder`` may be missing at the start, or vanish and come back: it is waited for. ``note``
+    hears of that, and of photos that were deleted or replaced before they were taken, in one line
+    each. Raises InputError as ``check_watchable`` does.
 
     Everything here runs in the thread that asks for the next item, ``stop`` and ``note`` too.
     """
@@ -92,7 +95,7 @@ def watch_photos(
                 photo = watched.take()
             if photo is not None:
                 yield photo
-            elif watched.is_over():
+            elif watched.is_over(idle_s()):
                 return
             else:
                 yield NotYet(watched.quiet_s)
@@ -155,10 +158,11 @@ class _WatchedFolder:
         """Seconds since a photo appeared, changed or was taken."""
         return time.monotonic() - self._last_news
 
-    def is_over(self) -> bool:
-        """Whether nothing is waiting and nothing has come for as long as the options allow."""
+    def is_over(self, idle_s: float) -> bool:
+        """Whether nothing is waiting, nothing has come, and nobody had anything to do, for as long
+        as the options allow."""
         timeout_s = self._options.idle_timeout_s
-        if timeout_s is None or self._waiting or self.quiet_s < timeout_s:
+        if timeout_s is None or self._waiting or min(self.quiet_s, idle_s) < timeout_s:
             return False
         # Whoever takes the photos may have been busy with something else all this time.
         return self._changes is None or not self._list()

@@ -29,7 +29,6 @@ class PhotoCatalog(Mapping[int, View]):
         self._duplicates = DuplicateFinder()
         self._camera_of: dict[int, pycolmap.Camera] = {}
         self._names: dict[int, str] = {}
-        self._ids: dict[str, int] = {}
         self._colors: dict[int, Uint8Array] = {}
         self._features = _FeatureMemory(stored, max_bytes)
 
@@ -54,10 +53,6 @@ class PhotoCatalog(Mapping[int, View]):
         """What the photo is called in the models."""
         return self._names[image_id]
 
-    def image_id(self, name: str) -> int:
-        """Raises KeyError if no photo has this name."""
-        return self._ids[name]
-
     @property
     def colors(self) -> Mapping[int, Uint8Array]:
         """Image id → (N, 3) uint8 RGB under each keypoint."""
@@ -66,7 +61,6 @@ class PhotoCatalog(Mapping[int, View]):
     def _enter(self, image_id: int, name: str, camera: pycolmap.Camera, colors: Uint8Array) -> None:
         self._camera_of[image_id] = camera
         self._names[image_id] = name
-        self._ids[name] = image_id
         self._colors[image_id] = colors
 
     def __getitem__(self, image_id: int) -> View:

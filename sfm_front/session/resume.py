@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from enum import Enum
+from dataclasses import asdict
 from itertools import chain, count
 from pathlib import Path
 from typing import Any, overload
@@ -14,6 +13,7 @@ from sfm_front.errors import InputError
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import DATABASE, check_output_folder, holds_session
 from sfm_front.storage.database import PhotoDatabase
+from sfm_front.storage.json_files import as_json
 from sfm_front.storage.session_lock import SessionLock
 from sfm_front.types import FileState, NotYet, PhotoPath
 
@@ -66,57 +66,12 @@ def is_finished(database: PhotoDatabase) -> bool:
     return database.recall(_STATE) == _FINISHED
 
 
-def named_in_session(
-    database: PhotoDatabase,
-    folder: Path,
-    photos: Sequence[PhotoPath],
-    output: Path,
-    *,
-    append: bool,
-) -> list[PhotoPath]:
-    """The photos of a folder under their names in the session, which remembers the folder.
+class Newcomers:
+    """Which photos of a folder a session has not seen, under their names in it.
 
     Names are those below the folder. Photos of every further folder are named after it, too: any
-    name may still appear in either. Raises InputError if the session is over another folder and
-    ``append`` is not wanted.
+    name may still appear in either.
     """
-    here = str(folder.resolve())
-    prefixes = _prefixes(database, folder, output, append=append)
-    if here not in prefixes:
-        prefixes[here] = _free_prefix(database, folder, photos, set(prefixes.values()))
-        database.remember(_SOURCES, json.dumps(prefixes))
-    return [PhotoPath(prefixes[here] + photo.name, photo.path) for photo in photos]
-
-
-def _prefixes(
-    database: PhotoDatabase, folder: Path, output: Path, *, append: bool
-) -> dict[str, str]:
-    """Folder → what precedes its photos' names. Raises InputError if ``folder`` may not come."""
-    prefixes: dict[str, str] = json.loads(database.recall(_SOURCES) or "{}")
-    if prefixes and not append and str(folder.resolve()) not in prefixes:
-        raise InputError(
-            f"{output}: holds the photos of {next(iter(prefixes))}. Give --append to add those "
-            f"of {folder} to it, or another --output."
-        )
-    return prefixes
-
-
-def _free_prefix(
-    database: PhotoDatabase, folder: Path, photos: Sequence[PhotoPath], taken: set[str]
-) -> str:
-    names = {photo.name for photo in database.photos()}
-    names |= {photo.name for photo, _ in database.skipped()}
-    own = {photo.name for photo in photos}
-    numbered = (f"{folder.resolve().name}{number or ''}/" for number in count())
-    return next(
-        prefix
-        for prefix in chain([""], numbered)
-        if prefix not in taken and not names & {prefix + name for name in own}
-    )
-
-
-class Newcomers:
-    """Which photos of a folder a session has not seen, under their names in it."""
 
     def __init__(
         self, database: PhotoDatabase, folder: Path, output: Path, *, append: bool
@@ -125,11 +80,14 @@ class Newcomers:
 
         Raises InputError if they may not, and the session is over another folder.
         """
-        _prefixes(database, folder, output, append=append)
         self._database = database
-        self._folder = folder
-        self._output = output
-        self._append = append
+        self._folder = folder.resolve()
+        self._prefixes: dict[str, str] = json.loads(database.recall(_SOURCES) or "{}")
+        if self._prefixes and not append and str(self._folder) not in self._prefixes:
+            raise InputError(
+                f"{output}: holds the photos of {next(iter(self._prefixes))}. Give --append to add "
+                f"those of {folder} to it, or another --output."
+            )
         self._used = {photo.name: photo.file for photo in database.photos()}
         self._skipped = {photo.name: file for photo, file in database.skipped()}
 
@@ -147,20 +105,31 @@ class Newcomers:
         """New photos, in their order. A file that was skipped and has changed since is new; one
         that was used and has changed stays as it was, and is told to ``note``.
         """
-        if isinstance(photos, Sequence):
-            photos = self._named(photos)
+        known = photos if isinstance(photos, Sequence) else ()
         for photo in photos:
             if isinstance(photo, NotYet):
                 yield photo
                 continue
-            if not isinstance(photos, Sequence):
-                (photo,) = self._named([photo])
-            if self._is_new(photo, note):
-                yield photo
+            named = PhotoPath(self._prefix(known or [photo]) + photo.name, photo.path)
+            if self._is_new(named, note):
+                yield named
 
-    def _named(self, photos: Sequence[PhotoPath]) -> list[PhotoPath]:
-        return named_in_session(
-            self._database, self._folder, photos, self._output, append=self._append
+    def _prefix(self, photos: Sequence[PhotoPath]) -> str:
+        """What precedes the folder's names; chosen when its first photos come, and remembered."""
+        here = str(self._folder)
+        if here not in self._prefixes:
+            self._prefixes[here] = self._free_prefix({photo.name for photo in photos})
+            self._database.remember(_SOURCES, json.dumps(self._prefixes))
+        return self._prefixes[here]
+
+    def _free_prefix(self, names: set[str]) -> str:
+        taken = self._used.keys() | self._skipped.keys()
+        numbered = (f"{self._folder.name}{number or ''}/" for number in count())
+        return next(
+            prefix
+            for prefix in chain([""], numbered)
+            if prefix not in self._prefixes.values()
+            and not taken & {prefix + name for name in names}
         )
 
     def _is_new(self, photo: PhotoPath, note: Callable[[str], None]) -> bool:
@@ -198,15 +167,10 @@ def _same(before: FileState, now: FileState) -> bool:
     return (before.size, before.mtime_ns) == (now.size, now.mtime_ns)
 
 
-def as_dict(options: Any) -> Any:
+def as_dict(options: SessionOptions) -> dict[str, Any]:
     """Options as JSON has them."""
-    if is_dataclass(options):
-        return {field.name: as_dict(getattr(options, field.name)) for field in fields(options)}
-    if isinstance(options, tuple | list):
-        return [as_dict(value) for value in options]
-    if isinstance(options, Enum):
-        return options.value
-    return str(options) if isinstance(options, Path) else options
+    found: dict[str, Any] = json.loads(as_json(asdict(options)))
+    return found
 
 
 def _differences(

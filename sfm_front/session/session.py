@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from sfm_front.errors import StorageError
 from sfm_front.events import (
     Listener,
     ModelEvent,
@@ -15,36 +17,22 @@ from sfm_front.events import (
     SessionEnded,
     SessionStarted,
 )
-from sfm_front.features.extraction import FeatureExtraction, make_extractor
-from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, resolve
-from sfm_front.mapping.atlas import Atlas
-from sfm_front.mapping.background_refinement import BackgroundAdjuster
+from sfm_front.features.global_descriptors.descriptor import resolve
 from sfm_front.mapping.finishing import finish
-from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.matching.guided_matching import GuidedMatcher
-from sfm_front.matching.matcher import make_matcher
-from sfm_front.matching.verification import Verifier
-from sfm_front.photos.reader import PhotoReader
 from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.report_json import write_report
 from sfm_front.reports.retrieval_log import RetrievalLog
-from sfm_front.reports.run_report import RunReport
 from sfm_front.reports.run_summary import RunSummary
-from sfm_front.retrieval.rerank import Reranker
-from sfm_front.retrieval.retriever import Retriever
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
-from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.announcer import Announcer
-from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import (
-    DATABASE,
     check_output_folder,
     open_output_folder,
 )
-from sfm_front.session.pair_matching import CandidateMatcher
+from sfm_front.session.parts import open_parts, restore
 from sfm_front.session.resume import as_dict, check_options, mark_finished, mark_running
 from sfm_front.session.snapshots import Snapshots, read_snapshot
 from sfm_front.storage.database import PhotoDatabase
@@ -119,129 +107,80 @@ class Session(Closeable):
         )
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         self._finished = False
-        # Whether the time has been used since the last photo.
-        self._is_idle = True
+        # Whether the models were settled since the last photo.
+        self._is_settled = True
+        self._idle_since_s: float | None = None
         self._idle_events: list[ModelEvent] = []
         self._announcer = Announcer([] if on_event is None else [on_event])
         # What is open is closed again if a later part cannot be made.
         with ExitStack() as opened:
             lock = open_output_folder(output, overwrite=overwrite, resume=resume)
             opened.callback(lock.close)
-            self._open(opened, device, descriptor)
-            self._restore(opened)
+            self._parts = open_parts(
+                opened, output, self.options, device, descriptor, self._announcer
+            )
+            self._go_on(opened)
             self._opened = opened.pop_all()
 
-    def _open(self, opened: ExitStack, device: str, descriptor: GlobalDescriptor) -> None:
-        threads = self.options.threads
-        self._extraction = FeatureExtraction(
-            PhotoReader(max_image_size=self.options.max_image_size),
-            make_extractor(device, self.options.sift),
-            descriptor,
-            num_threads=threads,
-        )
-        opened.callback(self._extraction.close)
-        self._workers = WorkerPool(threads)
-        opened.callback(self._workers.close)
-        verifier = Verifier(self.options.verification)
-        matcher = make_matcher(device, self.options.matching, self._workers)
-        self._reranker, second_reranker = (
-            Reranker(
-                options, matcher, verifier, self._workers, rotation=self.options.matching.rotation
-            )
-            for options in (self.options.rerank, self.options.second_rerank)
-        )
-        guided = GuidedMatcher(
-            self.options.guided, self.options.matching, self.options.verification, self._workers
-        )
-        self._pairs = CandidateMatcher(
-            self.options.pair_matching, matcher, second_reranker, verifier, guided, self._workers
-        )
-        self._retriever = Retriever(self.options.retrieval, descriptor.dimension)
-        self.database = PhotoDatabase(self.output / DATABASE)
-        opened.callback(self.database.close)
-        self._catalog = PhotoCatalog(
-            self.options.cameras, self.database.features, self.options.cache_bytes
-        )
-        self._view_graph = ViewGraph()
-        adjuster = None
-        # With one thread a session is the same to the bit each time: nothing runs beside it.
-        if threads > 1:
-            adjuster = BackgroundAdjuster()
-            opened.callback(adjuster.close)
-        self._atlas = Atlas(
-            self._view_graph, self.options.atlas, self._announcer.tell_of_model, adjuster
-        )
-        self._snapshots = Snapshots(self.output / "sparse", self.options.snapshot_seconds)
-        self._report = RunReport()
+    @property
+    def database(self) -> PhotoDatabase:
+        """What is known of all photos."""
+        return self._parts.database
 
-    def _restore(self, opened: ExitStack) -> None:
-        """Go on where an earlier run of this session stopped, if there was one."""
+    def _go_on(self, opened: ExitStack) -> None:
+        """Where an earlier run of this session stopped, if there was one."""
         known = check_options(self.database, self.options, self.output)
-        self._retrieval_log = RetrievalLog(self.output, self.database.photos())
-        opened.callback(self._retrieval_log.close)
-        event_log = EventLog.in_folder(self.output)
-        opened.callback(event_log.close)
+        self._retrieval_log = opened.enter_context(
+            RetrievalLog(self.output, self.database.photos())
+        )
+        event_log = opened.enter_context(EventLog.in_folder(self.output))
         self._announcer.add_listener(event_log.write)
-        snapshot = read_snapshot(self.output / "sparse") if known else None
+        self._snapshots = Snapshots(self.output / "sparse", self.options.snapshot_seconds)
         self.num_restored = self.database.num_photos()
         self._announcer.tell(SessionStarted(VERSION, as_dict(self.options), self.num_restored))
         mark_running(self.database)
-        for skipped, _ in self.database.skipped():
-            self._report.add(skipped)
-        cameras = self.database.cameras()
-        num_mapped = 0
-        if snapshot is not None and snapshot.num_photos <= self.num_restored:
-            num_mapped = snapshot.num_photos
-        for photo in self.database.photos():
-            features, camera = self.database.features(photo.image_id), cameras[photo.camera_id]
-            self._catalog.restore(photo, camera, features.colors)
-            self._retriever.remember(photo.image_id, photo.global_vector)
-            self._report.restore(photo)
-            self._view_graph.add(
-                photo.image_id,
-                photo.name,
-                camera,
-                features.keypoints,
-                self.database.pairs(photo.image_id),
-            )
-            if snapshot is not None and photo.image_id == num_mapped:
-                self._atlas.restore(snapshot.models)
-            elif photo.image_id > num_mapped:
-                placed = self._atlas.add(photo.image_id)
-                self._announcer.tell_outcome(self._atlas, photo.image_id, placed)
-        self._announcer.pop_model_events()
+        snapshot = read_snapshot(self.output / "sparse") if known else None
+        restore(self._parts, snapshot, self._announcer)
 
     def add(self, path: Path, name: str | None = None) -> PhotoAdded | Skipped:
         """Take in one photo; ``name`` is what it is called in the models (default: the file's)."""
         photo = self._announcer.arrive(PhotoPath(name or path.name, path))
-        return self.add_extracted(self._extraction.describe(photo))
+        return self.add_extracted(self._parts.extraction.describe(photo))
 
     def add_all(self, photos: Iterable[PhotoPath | NotYet]) -> Iterator[PhotoAdded | Skipped]:
         """Take in photos in order; the next ones are described while one is matched and mapped.
 
         ``NotYet`` among them, as ``photos.watch`` gives it, lets the session use the time.
         """
-        for extracted in self._extraction.stream(map(self._arrive, photos)):
+        for extracted in self._parts.extraction.stream(map(self._arrive, photos)):
             if isinstance(extracted, NotYet):
                 self.idle(extracted.seconds)
             else:
                 yield self.add_extracted(extracted)
 
     def idle(self, seconds: float) -> None:
-        """Nothing has arrived for ``seconds``: retry photos that wait, and refine, once."""
-        if self._is_idle or seconds < _IDLE_AFTER_S:
+        """Nothing has arrived for ``seconds``, and nothing is under way: retry photos that wait,
+        and refine, once."""
+        if self._idle_since_s is None:
+            self._idle_since_s = time.monotonic()
+        if self._is_settled or seconds < _IDLE_AFTER_S:
             return
-        self._is_idle = True
-        before = self._atlas.registered
-        self._atlas.settle()
-        for image_id in sorted(self._atlas.registered - before):
-            self._announcer.tell_placed(self._atlas, image_id)
+        self._is_settled = True
+        self._placing_more(self._parts.atlas.settle)
         # The next photo must not be charged with them.
         self._idle_events += self._announcer.pop_model_events()
-        self._snapshots.write(self._atlas.models, len(self._catalog), self._catalog.colors)
+        self._write_snapshot()
+
+    @property
+    def idle_s(self) -> float:
+        """Seconds for which nothing has been under way."""
+        return 0.0 if self._idle_since_s is None else time.monotonic() - self._idle_since_s
 
     def _arrive(self, photo: PhotoPath | NotYet) -> PhotoPath | NotYet:
-        return photo if isinstance(photo, NotYet) else self._announcer.arrive(photo)
+        if isinstance(photo, NotYet):
+            return photo
+        self._idle_since_s = None
+        return self._announcer.arrive(photo)
 
     def add_extracted(self, photo: ExtractedPhoto | Skipped) -> PhotoAdded | Skipped:
         """Take in a photo whose features are extracted already.
@@ -251,19 +190,14 @@ class Session(Closeable):
         """
         if self._finished:
             raise RuntimeError("the session is finished: begin another one for more photos")
+        path = self._announcer.path_of(photo.name)
         added = photo if isinstance(photo, Skipped) else self._add(photo)
-        self._report.add(added)
         if isinstance(added, Skipped):
-            self.database.write_skipped(added, self._announcer.path_of(added.name))
+            self.database.write_skipped(added, path)
+            self._parts.report.add(added)
             self._announcer.tell(added)
-        else:
-            self._is_idle = False
-            self._retrieval_log.add(added)
-            self._announcer.tell(added)
-            placed = [self._catalog.image_id(name) for name in added.registered]
-            self._announcer.tell_outcome(self._atlas, added.image_id, placed)
         if self._snapshots.is_due:
-            self._snapshots.write(self._atlas.models, len(self._catalog), self._catalog.colors)
+            self._write_snapshot()
         return added
 
     def finish(self) -> SessionResult:
@@ -272,22 +206,13 @@ class Session(Closeable):
             raise RuntimeError("the session is finished already")
         self._finished = True
         clock = Stopwatch()
-        before = self._atlas.registered
         with clock.stage("finish"):
-            finish(self._atlas)
-        for image_id in sorted(self._atlas.registered - before):
-            self._announcer.tell_placed(self._atlas, image_id)
+            self._placing_more(lambda: finish(self._parts.atlas))
         with clock.stage("export"):
-            models = self._snapshots.write(
-                self._atlas.models,
-                len(self._catalog),
-                self._catalog.colors,
-                final=True,
-                text=self.options.text,
-            )
-        summary = self._report.finish(
+            models = self._write_snapshot(final=True)
+        summary = self._parts.report.finish(
             models,
-            {i: self._atlas.why_not_registered(i) for i in self._atlas.waiting},
+            {i: self._parts.atlas.why_not_registered(i) for i in self._parts.atlas.waiting},
             seconds=clock.seconds,
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
@@ -302,52 +227,83 @@ class Session(Closeable):
 
     def close(self) -> None:
         """End; without ``finish``, the same session can be gone on with."""
+        if not self._finished:
+            self._finished = True
+            num_registered = len(self._parts.atlas.registered)
+            num_models = len(self._parts.atlas.models)
+            # The disk may be full, or the output gone: that was told when it was met.
+            with suppress(StorageError):
+                self._announcer.tell(
+                    SessionEnded(False, len(self._parts.catalog), num_registered, num_models)
+                )
         self._opened.close()
+
+    def _placing_more(self, act: Callable[[], None]) -> None:
+        """Do something that may place photos that wait, and tell of those."""
+        atlas = self._parts.atlas
+        before = atlas.registered
+        act()
+        for image_id in sorted(atlas.registered - before):
+            self._announcer.tell_placed(atlas, image_id)
+
+    def _write_snapshot(self, *, final: bool = False) -> list[ModelSummary]:
+        catalog, text = self._parts.catalog, final and self.options.text
+        models = self._parts.atlas.models
+        return self._snapshots.write(models, len(catalog), catalog.colors, final=final, text=text)
 
     def _add(self, photo: ExtractedPhoto) -> PhotoAdded | Skipped:
         """The method: retrieve, re-rank, match and verify, store, map, remember."""
-        clock = Stopwatch()
-        view = self._catalog.admit(photo)
+        parts, clock = self._parts, Stopwatch()
+        view = parts.catalog.admit(photo)
         if isinstance(view, Skipped):
             return view
         image_id = view.image_id
         with clock.stage("retrieve"):
-            candidates = self._retriever.candidates(photo.global_vector)
+            candidates = parts.retriever.candidates(photo.global_vector)
         with clock.stage("rerank"):
             enough = self.options.pair_matching.num_matched
-            ranked = self._reranker.rerank(view, candidates, self._catalog, enough=enough)
-        pairs, rejected = self._pairs.match(
+            ranked = parts.reranker.rerank(view, candidates, parts.catalog, enough=enough)
+        pairs, rejected = parts.pairs.match(
             view,
             ranked,
-            self._catalog,
-            locate=self._atlas.locate,
-            poses_of=self._atlas.poses_of,
+            parts.catalog,
+            locate=parts.atlas.locate,
+            poses_of=parts.atlas.poses_of,
             clock=clock,
         )
         unranked = candidates[len(ranked) :]
         outcomes = self._outcomes([*ranked, *unranked], pairs, rejected)
         with clock.stage("store"):
-            self.database.write(image_id, photo, view.camera, pairs, outcomes)
+            parts.database.write(image_id, photo, view.camera, pairs, outcomes)
         with clock.stage("map"):
             keypoints = photo.features.keypoints
-            self._view_graph.add(image_id, photo.name, view.camera, keypoints, pairs)
-            registered = self._atlas.add(image_id)
-        self._retriever.remember(image_id, photo.global_vector)
+            parts.view_graph.add(image_id, photo.name, view.camera, keypoints, pairs)
+            registered = parts.atlas.add(image_id)
+        parts.retriever.remember(image_id, photo.global_vector)
         events = self._announcer.pop_model_events()
         # Apart from the rest of mapping: it alone depends on how many photos came before.
         refinements = [event for event in events if isinstance(event, ModelRefined)]
         clock.move("map", "refine", sum(event.seconds for event in refinements))
-        return PhotoAdded(
+        added = PhotoAdded(
             name=photo.name,
             image_id=image_id,
             num_keypoints=len(photo.features),
             candidates=outcomes,
-            registered=tuple(self._catalog.name(i) for i in registered),
-            num_registered=len(self._atlas.registered),
-            num_points=self._atlas.num_points,
+            registered=tuple(parts.catalog.name(i) for i in registered),
+            num_registered=len(parts.atlas.registered),
+            num_points=parts.atlas.num_points,
             seconds={**photo.seconds, **clock.seconds},
             events=events,
         )
+        self._is_settled = False
+        self._tell(added, registered)
+        return added
+
+    def _tell(self, added: PhotoAdded, registered: Sequence[int]) -> None:
+        self._parts.report.add(added)
+        self._retrieval_log.add(added)
+        self._announcer.tell(added)
+        self._announcer.tell_outcome(self._parts.atlas, added.image_id, registered)
 
     def _outcomes(
         self,
@@ -358,7 +314,7 @@ class Session(Closeable):
         verified = {pair.image_id2 for pair in pairs}
         return tuple(
             CandidateOutcome(
-                self._catalog.name(candidate.image_id),
+                self._parts.catalog.name(candidate.image_id),
                 candidate.cosine,
                 candidate.inliers,
                 candidate.image_id in verified,

@@ -372,7 +372,7 @@ def test_events_are_printed_instead_of_the_progress(five, tmp_path, capsys):
     assert [json.loads(line)["event"] for line in written] == [e["event"] for e in events]
 
 
-WATCH = ("--watch", "--idle-timeout", "6")
+WATCH = ("--watch", "--idle-timeout", "0.5")
 
 
 def test_photos_are_taken_as_they_appear_in_a_folder(five, tmp_path, monkeypatch, capsys):

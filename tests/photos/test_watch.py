@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -332,6 +333,24 @@ def test_it_ends_when_nothing_has_come_for_long(tmp_path: Path) -> None:
             seconds.clear()
     assert taken == ["a.jpg", "b.jpg"]  # The second one waited for longer than the timeout.
     assert seconds == sorted(seconds)
+
+
+def test_the_timeout_does_not_run_while_photos_are_worked_on(tmp_path: Path) -> None:
+    """They are under way for longer than it; then another one comes."""
+    write(tmp_path / "a.jpg")
+    options = WatchOptions(rest_s=REST_S, idle_timeout_s=0.1)
+    idle_s = [0.0]
+    taken, quiet_s = [], 0.0
+    for item in watch_photos(tmp_path, options, idle_s=lambda: idle_s[0]):
+        if isinstance(item, PhotoPath):
+            taken.append(item.name)
+            idle_s[0] = math.inf if len(taken) == 2 else 0.0
+        elif len(taken) == 1:
+            if quiet_s < 0.3 <= item.seconds:
+                write(tmp_path / "b.jpg")
+            quiet_s = max(quiet_s, item.seconds)
+    assert taken == ["a.jpg", "b.jpg"]
+    assert quiet_s >= 0.3
 
 
 def test_the_folder_is_listed_once_more_before_the_timeout(

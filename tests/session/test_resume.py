@@ -18,10 +18,10 @@ from helpers.photo_stream import described, position_errors_m
 
 from sfm_front.errors import InputError, StorageError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
-from sfm_front.events import Event, ModelStarted, PhotoAdded, SessionStarted
+from sfm_front.events import Event, ModelStarted, PhotoAdded, SessionEnded, SessionStarted
 from sfm_front.session import snapshots
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.resume import Newcomers, is_finished, named_in_session
+from sfm_front.session.resume import Newcomers, is_finished
 from sfm_front.session.session import Session, SessionResult
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import ExtractedPhoto, NotYet, PhotoPath, Skipped, SkipReason
@@ -283,7 +283,8 @@ def test_a_file_that_was_skipped_is_so_no_longer_once_it_is_used(orbit, database
 
 def test_another_folder_is_added_only_when_wanted(database, folder, tmp_path):
     def named(where: Path, photos: list[PhotoPath], append: bool = False) -> list[str]:
-        named = named_in_session(database, where, photos, tmp_path, append=append)
+        newcomers = Newcomers(database, where, tmp_path, append=append)
+        named = list(newcomers.among(photos, lambda _: None))
         assert [photo.path for photo in named] == [photo.path for photo in photos]
         return [photo.name for photo in named]
 
@@ -295,8 +296,16 @@ def test_another_folder_is_added_only_when_wanted(database, folder, tmp_path):
     other = [PhotoPath("z.jpg", tmp_path / "z.jpg")]
     assert named(third, other, append=True) == ["z.jpg"]
     # Names that may still come in a fourth must not be those of the third.
-    assert named(tmp_path / "four", [], append=True) == []
+    fourth = [PhotoPath("y.jpg", tmp_path / "y.jpg")]
+    assert named(tmp_path / "four", fourth, append=True) == ["four/y.jpg"]
     assert named(tmp_path / "four", other) == ["four/z.jpg"]
     # Each folder keeps the names it was given.
     assert named(second, folder)[0] == "flight1/a.jpg"
     assert named(first, folder)[0] == "flight/a.jpg"
+
+
+def test_a_session_that_is_left_says_so(photos, tmp_path):
+    heard: list[Event] = []
+    with Session(tmp_path / "out", options(), on_event=heard.append) as session:
+        session.add_extracted(photos[0])
+    assert heard[-1] == SessionEnded(False, 1, 0, 0)

@@ -367,7 +367,7 @@ def test_what_is_open_is_closed_if_a_later_part_cannot_be_made(tmp_path, monkeyp
     def fail(_path):
         raise OSError("no database here")
 
-    monkeypatch.setattr("sfm_front.session.session.PhotoDatabase", fail)
+    monkeypatch.setattr("sfm_front.session.parts.PhotoDatabase", fail)
     with several_threads() as before:
         with pytest.raises(OSError, match="no database here"):
             Session(tmp_path / "out", options(2))

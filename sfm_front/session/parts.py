@@ -1,0 +1,114 @@
+"""The parts a session is made of, and their state when it goes on where an earlier run stopped."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from sfm_front.features.extraction import FeatureExtraction, make_extractor
+from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
+from sfm_front.mapping.atlas import Atlas
+from sfm_front.mapping.background_refinement import BackgroundAdjuster
+from sfm_front.mapping.view_graph import ViewGraph
+from sfm_front.matching.guided_matching import GuidedMatcher
+from sfm_front.matching.matcher import make_matcher
+from sfm_front.matching.verification import Verifier
+from sfm_front.photos.reader import PhotoReader
+from sfm_front.reports.run_report import RunReport
+from sfm_front.retrieval.rerank import Reranker
+from sfm_front.retrieval.retriever import Retriever
+from sfm_front.runtime.worker_pool import WorkerPool
+from sfm_front.session.announcer import Announcer
+from sfm_front.session.catalog import PhotoCatalog
+from sfm_front.session.options import SessionOptions
+from sfm_front.session.output_folder import DATABASE
+from sfm_front.session.pair_matching import CandidateMatcher
+from sfm_front.session.snapshots import Snapshot
+from sfm_front.storage.database import PhotoDatabase
+
+
+@dataclass(frozen=True)
+class SessionParts:
+    """Each does one step of the method, or remembers something for the next photo."""
+
+    extraction: FeatureExtraction
+    retriever: Retriever
+    reranker: Reranker
+    pairs: CandidateMatcher
+    database: PhotoDatabase
+    catalog: PhotoCatalog
+    view_graph: ViewGraph
+    atlas: Atlas
+    report: RunReport
+
+
+def open_parts(
+    opened: ExitStack,
+    output: Path,
+    options: SessionOptions,
+    device: str,
+    descriptor: GlobalDescriptor,
+    announcer: Announcer,
+) -> SessionParts:
+    """Make all parts; ``opened`` closes those that hold threads, processes or files."""
+    threads, rotation = options.threads, options.matching.rotation
+    extraction = opened.enter_context(
+        FeatureExtraction(
+            PhotoReader(max_image_size=options.max_image_size),
+            make_extractor(device, options.sift),
+            descriptor,
+            num_threads=threads,
+        )
+    )
+    workers = opened.enter_context(WorkerPool(threads))
+    verifier = Verifier(options.verification)
+    matcher = make_matcher(device, options.matching, workers)
+    reranker, second_reranker = (
+        Reranker(rerank, matcher, verifier, workers, rotation=rotation)
+        for rerank in (options.rerank, options.second_rerank)
+    )
+    guided = GuidedMatcher(options.guided, options.matching, options.verification, workers)
+    pairs = CandidateMatcher(
+        options.pair_matching, matcher, second_reranker, verifier, guided, workers
+    )
+    database = opened.enter_context(PhotoDatabase(output / DATABASE))
+    # With one thread a session is the same to the bit each time: nothing runs beside it.
+    adjuster = opened.enter_context(BackgroundAdjuster()) if threads > 1 else None
+    view_graph = ViewGraph()
+    return SessionParts(
+        extraction=extraction,
+        retriever=Retriever(options.retrieval, descriptor.dimension),
+        reranker=reranker,
+        pairs=pairs,
+        database=database,
+        catalog=PhotoCatalog(options.cameras, database.features, options.cache_bytes),
+        view_graph=view_graph,
+        atlas=Atlas(view_graph, options.atlas, announcer.tell_of_model, adjuster),
+        report=RunReport(),
+    )
+
+
+def restore(parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer) -> None:
+    """Go on with the photos in the database: models from the snapshot, what came after it anew."""
+    database, atlas = parts.database, parts.atlas
+    for skipped, _ in database.skipped():
+        parts.report.add(skipped)
+    num_mapped = 0
+    if snapshot is not None and snapshot.num_photos <= database.num_photos():
+        num_mapped = snapshot.num_photos
+    cameras = database.cameras()
+    for photo in database.photos():
+        image_id, camera = photo.image_id, cameras[photo.camera_id]
+        keypoints, colors = database.keypoints(image_id)
+        parts.catalog.restore(photo, camera, colors)
+        parts.retriever.remember(image_id, photo.global_vector)
+        parts.report.restore(photo)
+        pairs = database.pairs(image_id)
+        parts.view_graph.add(image_id, photo.name, camera, keypoints, pairs)
+        if snapshot is not None and image_id == num_mapped:
+            atlas.restore(snapshot.models)
+        elif image_id > num_mapped:
+            announcer.tell_outcome(atlas, image_id, atlas.add(image_id))
+    # Of earlier photos, whose reports are written.
+    announcer.pop_model_events()
