@@ -7,15 +7,12 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
 import pycolmap
 
 from sfm_front.events import Emit, ModelRefined
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
-from sfm_front.mapping.calibration import (
-    impossible_photos,
-    is_miscalibrated,
-)
+from sfm_front.mapping.calibration import impossible_photos, is_miscalibrated
+from sfm_front.mapping.camera_motion import camera_centers, camera_motion
 from sfm_front.mapping.carry_over import Before, carry_over
 from sfm_front.mapping.final_adjustment import final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
@@ -264,7 +261,7 @@ class Model:
         if refined is None:
             return
         self._under_way = None
-        started, centers = time.perf_counter(), self._centers()
+        started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         neighbors = {
             i: sorted(found, key=lambda j: -found[j])
             for i in self.registered - before.poses.keys()
@@ -284,7 +281,7 @@ class Model:
 
     def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
         self._under_way = None
-        started, centers = time.perf_counter(), self._centers()
+        started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         self._begin_anew()
         self._mapper.iterative_global_refinement(
             pipeline.ba_global_max_refinements,
@@ -307,25 +304,9 @@ class Model:
                     self.num_registered,
                     self.num_points,
                     seconds,
-                    *_shifts(centers, self._centers()),
+                    *camera_motion(centers, camera_centers(self.reconstruction)),
                 )
             )
 
-    def _centers(self) -> dict[int, Float64Array]:
-        """(3,) projection centres in world coordinates by image id."""
-        model = self.reconstruction
-        return {i: model.image(i).projection_center() for i in model.reg_image_ids()}
-
     def _note_refined(self) -> None:
         self._schedule.refined(self.num_registered, self.num_points)
-
-
-def _shifts(
-    before: Mapping[int, Float64Array], after: Mapping[int, Float64Array]
-) -> tuple[float, float]:
-    """Median and largest distance between the places of the photos that are in both."""
-    both = [image_id for image_id in before if image_id in after]
-    if not both:
-        return 0.0, 0.0
-    moved = [float(np.linalg.norm(after[i] - before[i])) for i in both]
-    return float(np.median(moved)), max(moved)

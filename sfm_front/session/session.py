@@ -28,10 +28,7 @@ from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.session.announcer import Announcer
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.output_folder import (
-    check_output_folder,
-    open_output_folder,
-)
+from sfm_front.session.output_folder import check_output_folder, open_output_folder
 from sfm_front.session.parts import open_parts, restore
 from sfm_front.session.resume import as_dict, check_options, mark_finished, mark_running
 from sfm_front.session.snapshots import Snapshots, read_snapshot
@@ -72,7 +69,8 @@ class Session(Closeable):
                 session.add(path)
             result = session.finish()
 
-    ``output`` receives ``database.db``, ``retrieval.jsonl``, ``report.json`` and ``sparse/``.
+    ``output`` receives ``database.db``, ``retrieval.jsonl``, ``events.jsonl``, ``report.json`` and
+    ``sparse/``.
     """
 
     def __init__(

@@ -7,25 +7,18 @@ disk is full. Rows that we write can be part of a transaction that holds all of 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
+from sfm_front.storage.sqlite_file import Row
 from sfm_front.types import ExtractedPhoto, GeoPosition, PairGeometry, Uint32Array
 
 _CAMERA = int(pycolmap.SensorType.CAMERA)
 _UNKNOWN_COVARIANCE = np.full((3, 3), np.nan)
 _UNKNOWN_GRAVITY = np.full(3, np.nan)
-
-
-class Row(NamedTuple):
-    """A row of ``table``; ``once``: it may be there already."""
-
-    table: str
-    values: dict[str, Any]
-    once: bool = False
 
 
 def camera_rows(camera: pycolmap.Camera) -> Iterator[Row]:

@@ -367,12 +367,12 @@ def test_a_full_disk_is_told_and_leaves_nothing_of_the_photo(orbit, tmp_path):
     file = tmp_path / "database.db"
     with PhotoDatabase(file) as store:
         store.write(1, described(orbit, 0), orbit.camera, [])
-        pages = store._connection.execute("PRAGMA page_count").fetchone()[0]
-        store._connection.execute(f"PRAGMA max_page_count={pages + 5}")
+        pages = store._file.rows("PRAGMA page_count")[0][0]
+        store._file.rows(f"PRAGMA max_page_count={pages + 5}")
         with pytest.raises(StorageError, match="full"):
             store.write(2, described(orbit, 1), orbit.camera, [])
         assert [photo.image_id for photo in store.photos()] == [1]
-        store._connection.execute("PRAGMA max_page_count=1000000")
+        store._file.rows("PRAGMA max_page_count=1000000")
         store.write(2, described(orbit, 1), orbit.camera, [])
         assert [photo.image_id for photo in store.photos()] == [1, 2]
 

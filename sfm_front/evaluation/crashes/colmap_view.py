@@ -66,9 +66,7 @@ def _main(database: Path, sparse: Path) -> None:
                     images[image.image_id] = (image.name, count)
         except (RuntimeError, ValueError) as error:
             broken.append(f"pycolmap cannot read the database: {error}")
-    for folder in sorted(sparse.iterdir()) if sparse.is_dir() else ():
-        if not folder.is_dir():
-            continue
+    for folder in sorted(filter(Path.is_dir, sparse.glob("*"))):
         try:
             model = read_model(folder)
         except InputError as error:

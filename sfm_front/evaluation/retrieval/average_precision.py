@@ -3,9 +3,8 @@
 Average precision is the area under the curve of precision over recall, cut into trapezoids, where
 precision before the first answer is 1. Written differently, it is the same number in
 
-- Oxford5k's and Paris6k's ``compute_ap.cpp`` (Philbin, Arandjelovic and Zisserman): positives are
-  the good and the ok photos, junk is skipped as if it were not in the ranking, and the query itself
-  counts if it is listed, which it always is in Oxford5k;
+- Oxford5k's and Paris6k's ``compute_ap.cpp`` (Philbin, Arandjelovic and Zisserman): good and ok
+  photos are positives, junk is skipped, the query counts if it is listed, as always in Oxford5k;
 - INRIA Holidays' ``holidays_map.py`` (Jegou and Douze): the query itself is skipped;
 - revisited Oxford and Paris' ``evaluate.py`` (Radenovic et al., CVPR 2018): junk is skipped, and
   queries without a positive are left out of the mean. Positives are the easy photos ("easy"), the
@@ -44,8 +43,7 @@ def average_precision(
 ) -> float:
     """Area under precision over recall, in [0, 1]. ``relevant`` must not be empty.
 
-    ``ranking``: names, best first. Those in ``ignored`` count as absent, even if relevant; relevant
-    ones missing from the ranking count as never found.
+    ``ranking``: names, best first. Those in ``ignored`` count as absent, relevant or not.
     """
     area, found, before = 0.0, 0, 1.0
     for position, name in enumerate(_counted(ranking, ignored), start=1):

@@ -129,7 +129,7 @@ def test_revisited_in_three_difficulties(tmp_path):
 
 def test_revisited_that_lacks_a_part(tmp_path):
     photos(tmp_path / "jpg", *(f"{name}.jpg" for name in "abcdq"))
-    with pytest.raises(InputError, match=r"gnd_rparis6k.pkl is missing; get it from http"):
+    with pytest.raises(InputError, match=r"no gnd_rparis6k.pkl; get it from http"):
         revisited.load_rparis6k(tmp_path)
     file = tmp_path / "gnd_rparis6k.pkl"
     file.write_bytes(pickle.dumps(ANNOTATION))

@@ -35,9 +35,7 @@ def load(folder: Path, name: str, source: str) -> tuple[Dataset, ...]:
     """
     annotation = next(iter(sorted(folder.rglob(f"gnd_{name}.pkl"))), None)
     if annotation is None:
-        raise InputError(
-            f"{folder}: gnd_{name}.pkl is missing; get it from {ANNOTATION_SOURCE}/{name}"
-        )
+        raise InputError(f"{folder}: no gnd_{name}.pkl; get it from {ANNOTATION_SOURCE}/{name}")
     searched, asked, queries = _read(annotation)
     found = photos_by_stem(folder)
     require(found, [*searched, *asked], folder, name, source)
