@@ -10,6 +10,7 @@ from weakref import WeakSet
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
+from sfm_front.runtime.allocator import keep_freed_memory
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.prefetch import prefetch
 from sfm_front.runtime.stopwatch import Stopwatch
@@ -71,6 +72,7 @@ class FeatureExtraction(Closeable):
         num_threads: int,
     ) -> None:
         """``num_threads``: number of photos described in parallel."""
+        keep_freed_memory()
         self._reader = reader
         self._sift = sift
         self._global = global_descriptor
