@@ -176,11 +176,16 @@ class Atlas:
         self.drop_covered()
         return grew
 
-    def settle(self) -> None:
-        """Refine all models, and register what fits them then."""
+    def settle(self) -> bool:
+        """Refine all models, and register what fits them then.
+
+        False if that is not yet done: a model is refined in the background, or has grown.
+        """
+        if not all(model.settle() for model in self.models):
+            return False
         for model in self.models:
-            model.refine()
-        self.refine_until_stable()
+            model.forget_failures()
+        return not self.grow()
 
     def refine_until_stable(self) -> None:
         """Grow and refine in turn until nothing more registers; failed photos are retried."""

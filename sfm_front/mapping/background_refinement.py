@@ -6,6 +6,7 @@ import json
 import logging
 import subprocess
 import sys
+import time
 from dataclasses import asdict
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -21,11 +22,15 @@ from sfm_front.runtime.subprocess_env import module_environment
 
 logger = logging.getLogger(__name__)
 
+# A model that takes longer would be stale by then.
+_PATIENCE_S = 600.0
+
 
 class BackgroundAdjuster(Closeable):
     """Adjusts one model at a time in another process, which starts with the first one.
 
-    ``is_broken``: that process has died, and nothing can be adjusted any more.
+    ``is_busy``: a model is with that process. ``is_broken``: it has died, or has not answered for
+    ten minutes, and nothing can be adjusted any more.
     """
 
     def __init__(self) -> None:
@@ -33,14 +38,15 @@ class BackgroundAdjuster(Closeable):
         self._model = Path(self._folder.name) / "model"
         self._process: subprocess.Popen[str] | None = None
         self._answers: SimpleQueue[str] = SimpleQueue()
-        self._is_busy = False
+        self._due_s = 0.0
+        self.is_busy = False
         self.is_broken = False
         self._ticket = 0
 
     @property
     def is_free(self) -> bool:
         """Whether it can take a model now."""
-        return not self._is_busy and not self.is_broken
+        return not self.is_busy and not self.is_broken
 
     def submit(self, reconstruction: pycolmap.Reconstruction, options: MapperOptions) -> int:
         """Begin to adjust a copy of a model as it is adjusted while it grows.
@@ -64,28 +70,32 @@ class BackgroundAdjuster(Closeable):
             process.stdin.flush()
         except OSError:
             self._break()
-        self._is_busy = not self.is_broken
+        self.is_busy = not self.is_broken
+        self._due_s = time.monotonic() + _PATIENCE_S
         self._ticket += 1
         return self._ticket
 
     def poll(self) -> None:
         """Note whether the adjustment under way has ended."""
-        if not self._is_busy:
+        if not self.is_busy:
             return
         try:
             answer = self._answers.get_nowait()
         except Empty:
-            return
-        self._is_busy = False
+            if time.monotonic() < self._due_s:
+                return
+            answer = ""
+        self.is_busy = False
         if answer != "done":
-            logger.warning("a model could not be refined beside the session: %s", answer)
             self._ticket += 1  # nobody has a ticket for this
-            if not answer:
+            if answer:
+                logger.warning("a model could not be refined beside the session: %s", answer)
+            else:
                 self._break()
 
     def result(self, ticket: int) -> pycolmap.Reconstruction | None:
         """The adjusted copy; None if it is still under way, failed, or another one came since."""
-        if self._is_busy or ticket != self._ticket:
+        if self.is_busy or ticket != self._ticket:
             return None
         return pycolmap.Reconstruction(self._model)
 
@@ -117,6 +127,6 @@ class BackgroundAdjuster(Closeable):
         self._answers.put("")
 
     def _break(self) -> None:
-        """The process has died: models are refined in the turn of a photo from now on."""
-        logger.warning("the process that refines models has ended")
+        """Models are refined in the turn of a photo from now on."""
+        logger.warning("the process that refines models has ended, or does not answer")
         self.is_broken = True

@@ -194,6 +194,20 @@ class Model:
         """Bundle-adjust the whole model, complete and merge tracks, drop what does not fit."""
         self._refine(self._options.final(self.num_registered))
 
+    def settle(self) -> bool:
+        """Refine the whole model unless that has been done since its last photo came.
+
+        False while it happens in the background: ask again.
+        """
+        self._take_refined()
+        if self._under_way is None and not self._is_settled:
+            self._refine_while_growing()
+        return self._is_settled
+
+    @property
+    def _is_settled(self) -> bool:
+        return self._under_way is None and self._schedule.last[0] == self.num_registered
+
     def finish(self) -> None:
         """Refine a last time. The model cannot grow any more after this."""
         self.refine()
@@ -257,10 +271,12 @@ class Model:
             return
         ticket, before = self._under_way
         self._adjuster.poll()
+        if self._adjuster.is_busy:
+            return
+        self._under_way = None
         refined = self._adjuster.result(ticket)
         if refined is None:
             return
-        self._under_way = None
         started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         neighbors = {
             i: sorted(found, key=lambda j: -found[j])

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from sfm_front.errors import StorageError
 from sfm_front.events import (
@@ -46,6 +47,8 @@ from sfm_front.types import (
     Skipped,
 )
 from sfm_front.version import VERSION
+
+Result = TypeVar("Result")
 
 # Photos that follow each other faster than this must not wait for a refinement.
 _IDLE_AFTER_S = 2.0
@@ -157,17 +160,17 @@ class Session(Closeable):
                 yield self.add_extracted(extracted)
 
     def idle(self, seconds: float) -> None:
-        """Nothing has arrived for ``seconds``, and nothing is under way: retry photos that wait,
-        and refine, once."""
+        """Nothing has arrived for ``seconds``, and nothing is under way: refine, and retry photos
+        that wait, until nothing changes any more. To be called again and again meanwhile."""
         if self._idle_since_s is None:
             self._idle_since_s = time.monotonic()
         if self._is_settled or seconds < _IDLE_AFTER_S:
             return
-        self._is_settled = True
-        self._placing_more(self._parts.atlas.settle)
+        self._is_settled = self._placing_more(self._parts.atlas.settle)
         # The next photo must not be charged with them.
         self._idle_events += self._announcer.pop_model_events()
-        self._write_snapshot()
+        if self._is_settled:
+            self._write_snapshot()
 
     @property
     def idle_s(self) -> float:
@@ -236,13 +239,14 @@ class Session(Closeable):
                 )
         self._opened.close()
 
-    def _placing_more(self, act: Callable[[], None]) -> None:
+    def _placing_more(self, act: Callable[[], Result]) -> Result:
         """Do something that may place photos that wait, and tell of those."""
         atlas = self._parts.atlas
         before = atlas.registered
-        act()
+        result = act()
         for image_id in sorted(atlas.registered - before):
             self._announcer.tell_placed(atlas, image_id)
+        return result
 
     def _write_snapshot(self, *, final: bool = False) -> list[ModelSummary]:
         catalog, text = self._parts.catalog, final and self.options.text

@@ -13,6 +13,7 @@ from helpers.photo_stream import SceneFeed, position_errors_m
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import ModelEvent, ModelRefined
+from sfm_front.mapping import background_refinement
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.carry_over import Before, carry_over
@@ -103,6 +104,14 @@ def test_a_process_that_dies_is_told_and_takes_no_more(grown, adjuster, caplog):
     assert "the process that refines models has ended" in caplog.text
 
 
+def test_a_process_that_does_not_answer_is_not_waited_for_for_ever(grown, adjuster, monkeypatch):
+    monkeypatch.setattr(background_refinement, "_PATIENCE_S", 0.0)
+    ticket = adjuster.submit(grown, OPTIONS)
+    adjuster.poll()
+    assert adjuster.is_broken
+    assert adjuster.result(ticket) is None
+
+
 def moved(model: pycolmap.Reconstruction, by: pycolmap.Sim3d) -> pycolmap.Reconstruction:
     other = copy.deepcopy(model)
     other.transform(by)
@@ -173,7 +182,7 @@ class SlowAdjuster(BackgroundAdjuster):
         self.polls += 1
         if self.polls % 3 == 0:
             until = time.monotonic() + PATIENCE_S
-            while self._is_busy and time.monotonic() < until:
+            while self.is_busy and time.monotonic() < until:
                 super().poll()
 
 
@@ -192,6 +201,30 @@ def test_photos_that_come_meanwhile_do_not_wait_and_the_model_is_as_true(orbit):
     assert [model.num_registered for model in atlas.models] == [NUM_PHOTOS]
     errors = position_errors_m(atlas.models[0].reconstruction, orbit)
     assert errors.max() < POSITION_TOLERANCE_M
+
+
+def test_settling_goes_on_in_the_background(orbit):
+    events: list[ModelEvent] = []
+    feed = SceneFeed(orbit)
+    with BackgroundAdjuster() as adjuster:
+        options = AtlasOptions(mapper=MapperOptions(num_threads=2))
+        atlas = Atlas(feed.scene, options, events.append, adjuster)
+        for index in range(NUM_PHOTOS):
+            atlas.add(feed.add(index))
+        wait_for(adjuster)
+        atlas.add(feed.add(0))
+        events.clear()
+        assert not atlas.settle()
+        assert events == []
+        until = time.monotonic() + PATIENCE_S
+        while not atlas.settle() and time.monotonic() < until:
+            time.sleep(0.01)
+        (refined,) = [event for event in events if isinstance(event, ModelRefined)]
+        assert refined.num_registered == NUM_PHOTOS + 1
+        # Nothing is left to do.
+        assert atlas.settle()
+        assert not adjuster.is_busy
+        assert len(events) == 1
 
 
 def test_without_the_process_models_are_refined_in_the_turn_of_a_photo(orbit):

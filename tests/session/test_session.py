@@ -30,6 +30,7 @@ from sfm_front.events import (
 )
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.mapping.mapper_options import MapperOptions
+from sfm_front.mapping.refinement_schedule import ScheduleOptions
 from sfm_front.photos.cameras import CameraOptions
 from sfm_front.reports.run_summary import Latency
 from sfm_front.session.options import SessionOptions
@@ -191,8 +192,11 @@ def test_a_listener_hears_of_everything_as_it_happens(orbit, tmp_path):
 def test_idle_time_is_used_once_and_no_photo_is_charged_with_it(orbit, tmp_path):
     heard: list[Event] = []
     unreadable = Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")
-    with Session(tmp_path / "out", options(), on_event=heard.append) as session:
-        for index in range(6):
+    # Only idle time refines.
+    never = MapperOptions(schedule=ScheduleOptions(growth=99, large_growth=99))
+    rarely = options(atlas=AtlasOptions(mapper=never))
+    with Session(tmp_path / "out", rarely, on_event=heard.append) as session:
+        for index in range(5):
             session.add_extracted(described(orbit, index))
 
         def refined_while_idle(seconds: float) -> float:
@@ -206,7 +210,7 @@ def test_idle_time_is_used_once_and_no_photo_is_charged_with_it(orbit, tmp_path)
         # A file that is not used changes nothing either.
         session.add_extracted(unreadable)
         assert refined_while_idle(60) == 0
-        added = session.add_extracted(described(orbit, 6))
+        added = session.add_extracted(described(orbit, 5))
         own = [event for event in heard if isinstance(event, ModelRefined)]
         assert [event for event in added.events if isinstance(event, ModelRefined)] == own
         assert added.seconds.get("refine", 0) == pytest.approx(sum(event.seconds for event in own))
