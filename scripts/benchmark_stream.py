@@ -38,6 +38,9 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--points", type=int, default=1000, metavar="N", help="points per photo")
     parser.add_argument("--threads", type=int, metavar="N", help="(default: all cores)")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--cache-mb", type=int, metavar="MB", help="memory for features of earlier photos"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every photo's figures")
     return parser.parse_args(argv)
 
@@ -49,6 +52,7 @@ def run(args: argparse.Namespace) -> None:
     options = SessionOptions(
         global_descriptor="vlad",
         threads=threads,
+        cache_mb=args.cache_mb,
         atlas=AtlasOptions(mapper=MapperOptions(num_threads=threads, seed=args.seed)),
     )
     with TemporaryDirectory(prefix="sfm_front_stream_") as output:
@@ -93,6 +97,9 @@ def format_result(result: StreamResult) -> str:
         f"CPU seconds {growth.processor_seconds:.2f}",
         f"CPU seconds follow the photo's number to the power {result.exponent(100):.2f}",
         "memory per photo: " + ("-" if per_photo is None else f"{per_photo / 2**20:.2f} MiB"),
+        f"memory in MiB: {_mib(result.memory.at_start)} before the first photo, at most "
+        f"{_mib(result.memory.peak_in_stream)} while they came, {_mib(result.memory.peak)} at all; "
+        f"of that pycolmap's graph and models {_mib(result.memory.colmap)}",
         f"end of the session: {result.finish_seconds:.1f} s",
         f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}",
     ]
@@ -103,12 +110,14 @@ def _line(start: int, end: int, photos: Sequence[PhotoCost], amortized: float) -
     seconds = np.mean([photo.seconds for photo in photos])
     refined = np.mean([photo.seconds_with_refinement for photo in photos])
     processor = np.mean([photo.processor_seconds for photo in photos])
-    memory = photos[-1].memory_bytes
-    shown = "-" if memory is None else f"{memory / 2**20:.0f}"
     return (
         f"{f'{start}-{end}':<12}{seconds:>10.3f}{refined:>17.3f}{amortized:>11.3f}"
-        f"{processor:>13.3f}{shown:>12}"
+        f"{processor:>13.3f}{_mib(photos[-1].memory_bytes):>12}"
     )
+
+
+def _mib(num_bytes: int | None) -> str:
+    return "-" if num_bytes is None else f"{num_bytes / 2**20:.0f}"
 
 
 def main() -> int:

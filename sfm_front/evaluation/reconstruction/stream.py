@@ -11,7 +11,8 @@ import numpy as np
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import auc, pose_errors
-from sfm_front.evaluation.process import resident_bytes
+from sfm_front.evaluation.process import peak_resident_bytes, resident_bytes
+from sfm_front.evaluation.reconstruction.colmap_memory import colmap_memory_bytes
 from sfm_front.evaluation.synthetic.scene import as_described, make_scene
 from sfm_front.events import PhotoAdded
 from sfm_front.features.global_descriptors.descriptor import resolve
@@ -48,12 +49,25 @@ class Growth:
 
 
 @dataclass(frozen=True, slots=True)
+class Memory:
+    """Memory of the process in bytes: before the first photo, with the synthetic flight in it; the
+    most before the end of the session began, and at all; and, of that, pycolmap's correspondence
+    graph and models. All None on systems without /proc."""
+
+    at_start: int | None
+    peak_in_stream: int | None
+    peak: int | None
+    colmap: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class StreamResult:
     """``finish_seconds``: the end of the session, export included. ``auc``: of the pose errors of
     all pairs, at 1, 3 and 5 degrees, in [0, 1]."""
 
     photos: tuple[PhotoCost, ...]
     finish_seconds: float
+    memory: Memory
     num_registered: int
     auc: tuple[float, ...]
 
@@ -126,6 +140,7 @@ def run_stream(
     scene = make_scene(num_photos, points_per_image, seed=seed, layout="strip")
     descriptor, _ = resolve(_DESCRIPTOR)
     costs: list[PhotoCost] = []
+    at_start = resident_bytes()
     with Session(output, options) as session:
         for index in range(num_photos):
             seen = scene.photo(index)
@@ -145,12 +160,15 @@ def run_stream(
                 )
             )
             note(added)
+        peak_in_stream = peak_resident_bytes()
         started = perf_counter()
         models = [model.reconstruction for model in session.finish().models]
         finish_seconds = perf_counter() - started
+    peak = peak_resident_bytes()
     return StreamResult(
         photos=tuple(costs),
         finish_seconds=finish_seconds,
+        memory=Memory(at_start, peak_in_stream, peak, colmap_memory_bytes(output)),
         num_registered=max((int(model.num_reg_images()) for model in models), default=0),
         auc=tuple(auc(pose_errors(scene.truth(), models))),
     )

@@ -10,11 +10,17 @@ import pytest
 from helpers.locations import SCRIPTS
 
 from sfm_front.errors import ConfigError
-from sfm_front.evaluation.reconstruction.stream import PhotoCost, StreamResult, run_stream
+from sfm_front.evaluation.reconstruction.stream import (
+    Memory,
+    PhotoCost,
+    StreamResult,
+    run_stream,
+)
 from sfm_front.session.options import SessionOptions
 
 SCRIPT = SCRIPTS / "benchmark_stream.py"
 EXPONENT_TOLERANCE = 0.05
+NO_MEMORY = Memory(None, None, None, None)
 
 
 def result_of(costs: list[float], memory: list[int | None] | None = None) -> StreamResult:
@@ -22,7 +28,7 @@ def result_of(costs: list[float], memory: list[int | None] | None = None) -> Str
     photos = tuple(
         PhotoCost(cost, 2 * cost, cost, held, 1) for cost, held in zip(costs, memory, strict=True)
     )
-    return StreamResult(photos, 1.0, len(costs), (1.0, 1.0, 1.0))
+    return StreamResult(photos, 1.0, NO_MEMORY, len(costs), (1.0, 1.0, 1.0))
 
 
 def test_growth_compares_means():
@@ -37,7 +43,9 @@ def test_growth_compares_means():
 def test_a_refinement_is_spread_over_the_photos_since_the_one_before():
     costs = [(1, 3), (2, 2), (2, 2), (1, 7), (5, 5)]
     photos = tuple(PhotoCost(alone, refined, refined, None, 1) for alone, refined in costs)
-    amortized = StreamResult(photos, 1.0, len(costs), (1.0, 1.0, 1.0)).amortized_seconds()
+    amortized = StreamResult(
+        photos, 1.0, NO_MEMORY, len(costs), (1.0, 1.0, 1.0)
+    ).amortized_seconds()
     np.testing.assert_allclose(amortized, [3, 4, 4, 3, 7])
 
 
@@ -69,6 +77,11 @@ def test_a_short_flight_goes_through_a_session(tmp_path):
     for photo in result.photos:
         assert 0 < photo.seconds <= photo.seconds_with_refinement
         assert photo.processor_seconds > 0
+    memory = result.memory
+    if memory.at_start is not None:
+        assert memory.at_start < memory.peak_in_stream <= memory.peak
+        # Its share of what came since the start: 6 photos take less than what is loaded once.
+        assert 0 < memory.colmap < memory.peak
     assert np.all([step.image_id is not None for step in steps])
 
 

@@ -1,0 +1,56 @@
+"""What pycolmap's correspondence graph and models of an output take. Run as a process, with OUTPUT.
+
+In the process of a session their memory cannot be told from the rest.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zlib  # noqa: F401  Before pycolmap, which exports one of its own.
+from pathlib import Path
+
+from sfm_front.evaluation.process import resident_bytes
+from sfm_front.runtime.subprocess_env import module_environment
+
+
+def colmap_memory_bytes(output: Path) -> int | None:
+    """Have a process of its own load both, as a session holds them; None without /proc."""
+    done = subprocess.run(
+        [sys.executable, "-m", __name__, str(output)],
+        env=module_environment(),
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    return int(done.stdout) if done.stdout.strip() else None
+
+
+def _main(output: Path) -> None:
+    from sfm_front.mapping.view_graph import ViewGraph
+    from sfm_front.session.output_folder import DATABASE
+    from sfm_front.storage.colmap_models import read_model
+    from sfm_front.storage.database import PhotoDatabase
+
+    view_graph = ViewGraph()
+    before = resident_bytes()
+    with PhotoDatabase(output / DATABASE) as database:
+        cameras = database.cameras()
+        for photo in database.photos():
+            keypoints, _ = database.keypoints(photo.image_id)
+            pairs = database.pairs(photo.image_id)
+            camera = cameras[photo.camera_id]
+            view_graph.add(photo.image_id, photo.name, camera, keypoints, pairs)
+    held = [
+        view_graph.new_mapper(read_model(folder))
+        for folder in sorted((output / "sparse").iterdir())
+        if folder.is_dir()
+    ]
+    after = resident_bytes()
+    if before is not None and after is not None:
+        print(after - before)
+    del held
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]))
