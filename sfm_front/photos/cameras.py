@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
@@ -28,7 +28,7 @@ class CameraOptions:
 
     # Which photos share one camera.
     #   auto: those of the same make, model, focal length and size; those without EXIF by folder
-    #   and size (see photos_per_size).
+    #   and size (see photos_per_size); the tops of folders that were added are one folder.
     #   single: all. per-folder: those of a folder. per-image: none.
     # In every mode photos of different size have different cameras: COLMAP would reject them in the
     # modes single and per-folder; here no photo is lost. Portrait and landscape differ in size.
@@ -83,6 +83,11 @@ class CameraOptions:
             )
 
 
+def folder_of(name: str) -> str:
+    """The folder that a photo's name says it is in."""
+    return str(PurePosixPath(name).parent)
+
+
 class CameraChoice(NamedTuple):
     """The camera of a photo; ``is_new`` if no earlier photo uses it."""
 
@@ -106,8 +111,15 @@ class CameraCatalog:
     its earlier photos in order, and continues as if it had never stopped.
     """
 
-    def __init__(self, options: CameraOptions | None = None) -> None:
+    def __init__(
+        self,
+        options: CameraOptions | None = None,
+        shared_folder: Callable[[str], str] = folder_of,
+    ) -> None:
+        """``shared_folder``: photos without EXIF may share a camera if it is the same for their
+        names."""
         self._options = options or CameraOptions()
+        self._shared_folder = shared_folder
         self._cameras: dict[Hashable, pycolmap.Camera] = {}
         self._folders: dict[str, _Folder] = {}
         self._calibrated_size: tuple[int, int] | None = None
@@ -137,7 +149,6 @@ class CameraCatalog:
     def _arrive(self, photo: AnyPhoto) -> Hashable:
         """Count a photo in; equal keys share a camera."""
         size = photo.width, photo.height
-        folder = str(PurePosixPath(photo.name).parent)
         if self._calibrated_size is None:
             self._calibrated_size = size
         match self._options.mode:
@@ -146,11 +157,12 @@ class CameraCatalog:
             case "single":
                 return ("all", size)
             case "per-folder":
-                return ("folder", folder, size)
+                return ("folder", folder_of(photo.name), size)
         exif = photo.exif
         identity = (exif.make, exif.model, exif.focal_length_mm, exif.focal_length_35mm)
         if any(identity):
             return ("camera", identity, size)
+        folder = self._shared_folder(photo.name)
         seen = self._folders.setdefault(folder, _Folder())
         seen.num_photos += 1
         seen.sizes.add((min(size), max(size)))

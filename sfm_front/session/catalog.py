@@ -8,7 +8,7 @@ from threading import Lock
 
 import pycolmap
 
-from sfm_front.photos.cameras import CameraCatalog, CameraOptions
+from sfm_front.photos.cameras import CameraCatalog
 from sfm_front.photos.duplicates import DuplicateFinder
 from sfm_front.types import ExtractedPhoto, Features, Skipped, StoredPhoto, Uint8Array, View
 
@@ -21,11 +21,11 @@ class PhotoCatalog(Mapping[int, View]):
     """
 
     def __init__(
-        self, cameras: CameraOptions, stored: Callable[[int], Features], max_bytes: int
+        self, cameras: CameraCatalog, stored: Callable[[int], Features], max_bytes: int
     ) -> None:
         """``stored`` gives the features of a photo that is no longer in memory; those in memory
         take ``max_bytes`` at most."""
-        self._cameras = CameraCatalog(cameras)
+        self._cameras = cameras
         self._duplicates = DuplicateFinder()
         self._camera_of: dict[int, pycolmap.Camera] = {}
         self._names: dict[int, str] = {}

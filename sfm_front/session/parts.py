@@ -14,6 +14,7 @@ from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import make_matcher
 from sfm_front.matching.verification import Verifier
+from sfm_front.photos.cameras import CameraCatalog
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.reports.run_report import RunReport
 from sfm_front.retrieval.rerank import Reranker
@@ -24,6 +25,7 @@ from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import DATABASE
 from sfm_front.session.pair_matching import CandidateMatcher
+from sfm_front.session.photo_folders import PhotoFolders
 from sfm_front.session.snapshots import Snapshot
 from sfm_front.storage.database import PhotoDatabase
 
@@ -75,6 +77,7 @@ def open_parts(
     database = opened.enter_context(PhotoDatabase(output / DATABASE))
     # With one thread a session is the same to the bit each time: nothing runs beside it.
     adjuster = opened.enter_context(BackgroundAdjuster()) if threads > 1 else None
+    cameras = CameraCatalog(options.cameras, PhotoFolders(database).folder_of)
     view_graph = ViewGraph()
     return SessionParts(
         extraction=extraction,
@@ -82,7 +85,7 @@ def open_parts(
         reranker=reranker,
         pairs=pairs,
         database=database,
-        catalog=PhotoCatalog(options.cameras, database.features, options.cache_bytes),
+        catalog=PhotoCatalog(cameras, database.features, options.cache_bytes),
         view_graph=view_graph,
         atlas=Atlas(view_graph, options.atlas, announcer.tell_of_model, adjuster),
         report=RunReport(),

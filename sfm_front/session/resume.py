@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from itertools import chain, count
 from pathlib import Path
 from typing import Any, overload
 
 from sfm_front.errors import InputError
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import DATABASE, check_output_folder, holds_session
+from sfm_front.session.photo_folders import PhotoFolders
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.storage.json_files import as_json
 from sfm_front.storage.session_lock import SessionLock
@@ -19,7 +19,6 @@ from sfm_front.types import FileState, NotYet, PhotoPath
 
 _OPTIONS = "options"
 _STATE = "state"
-_SOURCES = "sources"
 _RUNNING, _FINISHED = "running", "finished"
 
 # These say how the work is done, not what comes out of it.
@@ -67,11 +66,7 @@ def is_finished(database: PhotoDatabase) -> bool:
 
 
 class Newcomers:
-    """Which photos of a folder a session has not seen, under their names in it.
-
-    Names are those below the folder. Photos of every further folder are named after it, too: any
-    name may still appear in either.
-    """
+    """Which photos of a folder a session has not seen, under their names in it."""
 
     def __init__(
         self, database: PhotoDatabase, folder: Path, output: Path, *, append: bool
@@ -80,12 +75,12 @@ class Newcomers:
 
         Raises InputError if they may not, and the session is over another folder.
         """
-        self._database = database
+        self._folders = PhotoFolders(database)
         self._folder = folder.resolve()
-        self._prefixes: dict[str, str] = json.loads(database.recall(_SOURCES) or "{}")
-        if self._prefixes and not append and str(self._folder) not in self._prefixes:
+        known = self._folders.prefixes
+        if known and not append and str(self._folder) not in known:
             raise InputError(
-                f"{output}: holds the photos of {next(iter(self._prefixes))}. Give --append to add "
+                f"{output}: holds the photos of {next(iter(known))}. Give --append to add "
                 f"those of {folder} to it, or another --output."
             )
         self._used = {photo.name: photo.file for photo in database.photos()}
@@ -105,32 +100,17 @@ class Newcomers:
         """New photos, in their order. A file that was skipped and has changed since is new; one
         that was used and has changed stays as it was, and is told to ``note``.
         """
-        known = photos if isinstance(photos, Sequence) else ()
+        prefix: str | None = None
         for photo in photos:
             if isinstance(photo, NotYet):
                 yield photo
                 continue
-            named = PhotoPath(self._prefix(known or [photo]) + photo.name, photo.path)
+            if prefix is None:
+                taken = self._used.keys() | self._skipped.keys()
+                prefix = self._folders.prefix(self._folder, taken)
+            named = PhotoPath(prefix + photo.name, photo.path)
             if self._is_new(named, note):
                 yield named
-
-    def _prefix(self, photos: Sequence[PhotoPath]) -> str:
-        """What precedes the folder's names; chosen when its first photos come, and remembered."""
-        here = str(self._folder)
-        if here not in self._prefixes:
-            self._prefixes[here] = self._free_prefix({photo.name for photo in photos})
-            self._database.remember(_SOURCES, json.dumps(self._prefixes))
-        return self._prefixes[here]
-
-    def _free_prefix(self, names: set[str]) -> str:
-        taken = self._used.keys() | self._skipped.keys()
-        numbered = (f"{self._folder.name}{number or ''}/" for number in count())
-        return next(
-            prefix
-            for prefix in chain([""], numbered)
-            if prefix not in self._prefixes.values()
-            and not taken & {prefix + name for name in names}
-        )
 
     def _is_new(self, photo: PhotoPath, note: Callable[[str], None]) -> bool:
         now = FileState.of(photo.path)

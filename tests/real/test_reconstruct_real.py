@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pycolmap
 import pytest
 from helpers.locations import DATA
@@ -17,6 +19,8 @@ FAST = ("--max-image-size", "1000", "--max-features", "2000", "--global-descript
 
 FOUNTAIN_AUC_AT_5_DEG = 0.85
 DOOR_AUC_AT_5_DEG = 0.95
+# Half a point in a hundred.
+MAX_AUC_LOST = 0.005
 
 pytestmark = [
     pytest.mark.slow,
@@ -66,3 +70,24 @@ def test_a_flight_is_whole_and_its_gps_is_in_the_database(tmp_path):
     assert flight.model.num_reg_images() == 18
     with pycolmap.Database.open(flight.output / "database.db") as database:
         assert database.num_pose_priors() == 18
+
+
+@pytest.mark.parametrize("scene", ["strecha_fountain_P11", "lund_door"])
+def test_two_folders_one_after_the_other_give_what_one_gives(scene, tmp_path):
+    photos = sorted((DATA / scene / "images").iterdir())
+    halves = {"first": photos[: len(photos) // 2], "second": photos[len(photos) // 2 :]}
+    for name, half in halves.items():
+        (tmp_path / name).mkdir()
+        for photo in half:
+            shutil.copy(photo, tmp_path / name / photo.name)
+        command = ["reconstruct", str(tmp_path / name), "--output", str(tmp_path / "two"), *FAST]
+        assert main([*command, "--append"]) == 0
+    at_once = run(scene, tmp_path / "once")
+    (folder,) = (path for path in (tmp_path / "two" / "sparse").iterdir() if path.is_dir())
+    two = pycolmap.Reconstruction(folder)
+    assert two.num_reg_images() == len(photos)
+    for image in two.images.values():
+        image.name = image.name.removeprefix("second/")
+    truth = pycolmap.Reconstruction(DATA / scene / "gt")
+    areas, expected = (auc(pose_errors(truth, [model])) for model in (two, at_once.model))
+    assert np.all(np.abs(np.array(areas) - expected) <= MAX_AUC_LOST)
