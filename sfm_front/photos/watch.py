@@ -123,6 +123,14 @@ class _Waiting:
     is_cut_short: bool = False
 
 
+@dataclass(slots=True)
+class _Taken:
+    """A photo that was taken, in which state, and whether it was whole then."""
+
+    state: _FileState
+    was_whole: bool
+
+
 class _WatchedFolder:
     """The photos of a folder that were not taken yet."""
 
@@ -144,8 +152,7 @@ class _WatchedFolder:
         self._was_there = False
         # By name, in the order they were found.
         self._waiting: dict[str, _Waiting] = {}
-        # Their state if they were not whole then, else None.
-        self._taken: dict[str, _FileState | None] = {}
+        self._taken: dict[str, _Taken] = {}
         self._unlistable: set[str] = set()
         # All by the monotonic clock.
         self._last_news = time.monotonic()
@@ -185,7 +192,7 @@ class _WatchedFolder:
                 self._last_news = now
             elif self._is_ready(waiting, now - waiting.since):
                 del self._waiting[name]
-                self._taken[name] = state if waiting.is_cut_short else None
+                self._taken[name] = _Taken(state, was_whole=not waiting.is_cut_short)
                 self._last_news = now
                 return waiting.photo
         return None
@@ -258,13 +265,21 @@ class _WatchedFolder:
         found = find_photos(self._folder, exclude=self._exclude, on_error=self._cannot_be_listed)
         num_before = len(self._waiting)
         for photo in found:
-            before = self._taken.get(photo.name)
-            if photo.name in self._waiting or (photo.name in self._taken and before is None):
+            if photo.name in self._waiting:
                 continue
-            state = _state_of(photo.path)
-            if state not in (None, before):
-                self._last_news = time.monotonic()
-                self._waiting[photo.name] = _Waiting(photo, state, self._last_news)
+            state, taken = _state_of(photo.path), self._taken.get(photo.name)
+            if state is None or (taken is not None and state == taken.state):
+                continue
+            if taken is not None and taken.was_whole:
+                # The same bytes may have been copied once more.
+                if state.size != taken.state.size:
+                    self._note(
+                        f"{photo.name}: has changed since it was taken in; the old one stays"
+                    )
+                taken.state = state
+                continue
+            self._last_news = time.monotonic()
+            self._waiting[photo.name] = _Waiting(photo, state, self._last_news)
         now = time.monotonic()
         self._no_listing_before = now + (now - began) * (1 / _LISTING_SHARE - 1)
         self._next_listing = now + self._options.rescan_s

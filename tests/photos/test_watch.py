@@ -217,6 +217,19 @@ def test_a_photo_replaced_while_it_waits_is_taken_once(
     assert watched.notes == ["a.jpg: replaced before it was taken"]
 
 
+def test_a_photo_that_changes_after_it_was_taken_is_told_once(
+    tmp_path: Path, watching: Begin
+) -> None:
+    """As when a second card with the same names comes into the folder."""
+    write(tmp_path / "a.jpg")
+    watched = watching(tmp_path)
+    watched.take("a.jpg")
+    write(tmp_path / "a.jpg", content() + b"more")
+    watched.until(lambda: bool(watched.notes))
+    watched.take_none()
+    assert watched.notes == ["a.jpg: has changed since it was taken in; the old one stays"]
+
+
 def test_a_file_that_never_becomes_whole_is_handed_on(tmp_path: Path, watching: Begin) -> None:
     """For the reader to say what is wrong with it; those after it do not wait for it."""
     write(tmp_path / "a.jpg", content()[:-100])
