@@ -129,6 +129,7 @@ class _Taken:
 
     state: _FileState
     was_whole: bool
+    change_told: bool = False
 
 
 class _WatchedFolder:
@@ -272,11 +273,11 @@ class _WatchedFolder:
                 continue
             if taken is not None and taken.was_whole:
                 # The same bytes may have been copied once more.
-                if state.size != taken.state.size:
+                if state.size != taken.state.size and not taken.change_told:
+                    taken.change_told = True
                     self._note(
                         f"{photo.name}: has changed since it was taken in; the old one stays"
                     )
-                taken.state = state
                 continue
             self._last_news = time.monotonic()
             self._waiting[photo.name] = _Waiting(photo, state, self._last_news)
