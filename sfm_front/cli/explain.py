@@ -16,11 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--draw",
         type=Path,
         metavar="FILE.png",
-        help="picture of the matches with its first verified candidate, inliers in colour; "
-        "needs --photos",
+        help="picture of the matches with its first verified candidate, inliers in colour",
     )
     parser.add_argument(
-        "--photos", type=Path, metavar="FOLDER", help="the folder that was reconstructed"
+        "--photos",
+        type=Path,
+        metavar="FOLDER",
+        help="where the photos are, if they are no longer where they were",
     )
     parser.add_argument(
         "--against", metavar="PHOTO", help="draw the matches with this photo instead"
@@ -33,8 +35,6 @@ def run(arguments: argparse.Namespace) -> int:
     from sfm_front.viewers.pictures import check_picture
 
     if arguments.draw is not None:
-        if arguments.photos is None:
-            raise InputError("--draw needs --photos FOLDER: the output holds no pictures")
         check_picture(arguments.draw)
     explanation = explain(arguments.output, arguments.photo)
     print(explanation)
@@ -48,21 +48,24 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if explanation.model is not None else 1
 
 
-def _draw(output: Path, photos: Path, name1: str, name2: str, file: Path) -> None:
-    from sfm_front.reports.explanation import pair_matches
+def _draw(output: Path, photos: Path | None, name1: str, name2: str, file: Path) -> None:
+    from sfm_front.reports.explanation import pair_matches, photo_file
     from sfm_front.viewers.match_drawing import draw_matches
     from sfm_front.viewers.pictures import save
 
-    for name in (name1, name2):
-        if not (photos / name).is_file():
-            raise InputError(f"{photos / name}: no such photo. Give the folder with --photos.")
     matches = pair_matches(output, name1, name2)
+    file1, file2 = (
+        photo_file(output, name) if photos is None else photos / name for name in (name1, name2)
+    )
+    for path in (file1, file2):
+        if not path.is_file():
+            raise InputError(f"{path}: no such photo. Give the folder where it is with --photos.")
     count = int(matches.is_inlier.sum())
     verdict = "verified" if matches.verified else "not verified, so matched again"
     caption = f"{name1}, {name2}: {count} of {len(matches.xy1)} matches are inliers ({verdict})"
     picture = draw_matches(
-        photos / name1,
-        photos / name2,
+        file1,
+        file2,
         matches.xy1,
         matches.xy2,
         matches.sizes,

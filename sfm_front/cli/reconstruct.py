@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--idle-timeout",
         type=float,
         metavar="SECONDS",
-        help="with --watch, finish when no photo has come for so long",
+        help="with --watch, finish when no photo has come for that long",
     )
     parser.add_argument(
         "--snapshot-seconds",

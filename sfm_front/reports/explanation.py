@@ -18,6 +18,7 @@ from sfm_front.reports.report_json import read_report
 from sfm_front.reports.retrieval_log import read_candidates
 from sfm_front.reports.run_summary import Outcome, RunSummary
 from sfm_front.storage.colmap_models import read_model
+from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import CandidateOutcome, Features, Float64Array, Skipped, Uint32Array, View
 
 
@@ -126,6 +127,15 @@ def explain(output: Path, name: str) -> Explanation:
         num_points=0 if model is None else _num_points(output / model, ids[name]),
         why_not=photo.why_not or "",
     )
+
+
+def photo_file(output: Path, name: str) -> Path:
+    """Where a photo of an output was when it was taken in. Raises InputError if it has none."""
+    with PhotoDatabase(output / "database.db") as database:
+        for photo in database.photos():
+            if photo.name == name:
+                return photo.path
+    raise InputError(f"{output}: {name} is not in its database: nothing to draw")
 
 
 def pair_matches(output: Path, name1: str, name2: str) -> PairMatches:

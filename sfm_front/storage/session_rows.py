@@ -112,5 +112,5 @@ def read_skipped(row: tuple[Any, ...]) -> tuple[Skipped, FileState]:
 
 def _file(path: Path) -> dict[str, Any]:
     """Where a file is, and its state now; None if it is gone."""
-    state = FileState.of(path)
+    state = FileState.of(path.absolute())
     return {"path": os.fsencode(state.path), "size": state.size, "mtime_ns": state.mtime_ns}
