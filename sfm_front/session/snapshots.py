@@ -23,6 +23,10 @@ logger = logging.getLogger(__name__)
 _VERSION = 1
 # A snapshot of a large model takes long: at most this share of the time goes into them.
 _MAX_SHARE = 0.05
+# The first one comes after so many seconds, the next ones after this share of the session's age: of
+# what was mapped when a young session is killed, at most a quarter is mapped again.
+_FIRST_S = 1.0
+_SHARE_OF_AGE = 1 / 3
 
 
 @dataclass(frozen=True)
@@ -34,12 +38,13 @@ class Snapshot:
 
 
 class Snapshots:
-    """Writes the models at most ``interval_s`` after the last photo that changed them."""
+    """Writes the models every ``interval_s``, and more often while the session is young."""
 
     def __init__(self, folder: Path, interval_s: float) -> None:
         self._folder = folder
         self._interval_s = interval_s
-        self._next = time.monotonic() + interval_s
+        self._began = time.monotonic()
+        self._next = self._began + min(interval_s, _FIRST_S)
 
     @property
     def is_due(self) -> bool:
@@ -79,7 +84,8 @@ class Snapshots:
             },
         )
         now = time.monotonic()
-        self._next = now + max(self._interval_s, (now - started) / _MAX_SHARE)
+        wanted_s = max(_FIRST_S, (now - self._began) * _SHARE_OF_AGE)
+        self._next = now + max(min(self._interval_s, wanted_s), (now - started) / _MAX_SHARE)
         return summaries
 
 
