@@ -141,6 +141,18 @@ class PhotoArrived:
 
 
 @dataclass(frozen=True, slots=True)
+class PhotoDescribed:
+    """A photo has its features and its global vector, and its turn begins.
+
+    ``seconds`` by stage, much of it beside the turns of earlier photos.
+    """
+
+    name: str
+    num_keypoints: int
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class PhotoPlaced:
     """A photo was registered in a model.
 
@@ -179,7 +191,9 @@ class SessionEnded:
     num_models: int
 
 
-PhotoEvent: TypeAlias = PhotoArrived | Skipped | PhotoAdded | PhotoPlaced | PhotoWaiting
+PhotoEvent: TypeAlias = (
+    PhotoArrived | Skipped | PhotoDescribed | PhotoAdded | PhotoPlaced | PhotoWaiting
+)
 SessionEvent: TypeAlias = SessionStarted | SessionEnded
 Event: TypeAlias = PhotoEvent | ModelEvent | SessionEvent
 """What a listener of a session hears of."""

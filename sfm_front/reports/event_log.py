@@ -8,6 +8,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``session_started`` | ``version`` of the package, all ``options``, ``num_photos`` there already |
 | ``photo_arrived`` | the photo was noticed |
 | ``photo_skipped`` | ``reason`` and ``detail`` |
+| ``photo_described`` | it has its features, and its turn begins; ``seconds`` by stage |
 | ``photo_added`` | acknowledged: all its rows are in the database and on the disk |
 | ``photo_placed`` | model, ``cam_from_world``, camera, inliers, ``latency_s`` from arrival |
 | ``photo_waiting`` | it fits no model yet, and why |
@@ -37,6 +38,7 @@ from sfm_front.events import (
     ModelStarted,
     PhotoAdded,
     PhotoArrived,
+    PhotoDescribed,
     PhotoPlaced,
     PhotoWaiting,
     RegisteredStructureLess,
@@ -53,6 +55,7 @@ _NAMES: dict[type, str] = {
     SessionStarted: "session_started",
     PhotoArrived: "photo_arrived",
     Skipped: "photo_skipped",
+    PhotoDescribed: "photo_described",
     PhotoAdded: "photo_added",
     PhotoPlaced: "photo_placed",
     PhotoWaiting: "photo_waiting",

@@ -15,6 +15,7 @@ from sfm_front.events import (
     ModelEvent,
     ModelRefined,
     PhotoAdded,
+    PhotoDescribed,
     SessionEnded,
     SessionStarted,
 )
@@ -259,6 +260,7 @@ class Session(Closeable):
         view = parts.catalog.admit(photo)
         if isinstance(view, Skipped):
             return view
+        self._announcer.tell(PhotoDescribed(photo.name, len(photo.features), photo.seconds))
         image_id = view.image_id
         with clock.stage("retrieve"):
             candidates = parts.retriever.candidates(photo.global_vector)
