@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from sfm_front.errors import StorageError
-from sfm_front.events import PhotoArrived
+from sfm_front.events import Event, PhotoArrived
+from sfm_front.reports import event_log
 from sfm_front.reports.event_log import FILE, EventLog
 
 
@@ -21,6 +23,12 @@ def test_a_torn_line_of_a_killed_process_is_dropped(tmp_path):
         log.write(PhotoArrived("b.jpg"))
     lines = (tmp_path / FILE).read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["name"] for line in lines] == ["a.jpg", "b.jpg"]
+
+
+@pytest.mark.parametrize("kind", get_args(Event))
+def test_each_event_is_in_the_schema(kind):
+    name = event_log._NAMES[kind]
+    assert f"``{name}``" in event_log.__doc__
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's always full device")
