@@ -402,3 +402,17 @@ def test_a_database_that_was_removed_is_not_written_to(orbit, tmp_path):
         file.unlink()
         with pytest.raises(StorageError, match="was removed"):
             store.write(1, described(orbit, 0), orbit.camera, [])
+
+
+def test_a_database_that_another_program_holds_for_itself_is_told(orbit, tmp_path):
+    file = tmp_path / "database.db"
+    with PhotoDatabase(file) as store:
+        store.write(1, described(orbit, 0), orbit.camera, [])
+    other = sqlite3.connect(file, isolation_level=None)
+    other.execute("PRAGMA locking_mode=EXCLUSIVE")
+    other.execute("BEGIN EXCLUSIVE")
+    with pytest.raises(StorageError, match=r"is locked.*goes on from here once that is mended"):
+        PhotoDatabase(file)
+    other.close()
+    with PhotoDatabase(file) as store:
+        assert store.num_photos() == 1
