@@ -34,7 +34,7 @@ def first_name_lost_in_text(names: Iterable[str]) -> str | None:
 
 def export_models(
     reconstructions: Sequence[pycolmap.Reconstruction],
-    colors: Mapping[int, Uint8Array],
+    colors: Mapping[int, Uint8Array] | None,
     folder: Path,
     *,
     text: bool = False,
@@ -43,7 +43,8 @@ def export_models(
 ) -> list[ModelSummary]:
     """Colour models and write them to ``folder/0``, ``folder/1``, … in the order given.
 
-    ``colors``: image id → (N, 3) uint8 RGB of its keypoints. ``text`` adds COLMAP's text form,
+    ``colors``: image id → (N, 3) uint8 RGB of its keypoints; None if the points have their colours
+    already. ``text`` adds COLMAP's text form,
     ``point_clouds`` PLY files, ``state`` a JSON file with this content and the files' sizes. A
     model with a photo whose name text cannot keep gets no text: a warning names the photo.
     Everything is written beside ``folder`` first, synced, and then moved into place, so that a
@@ -72,7 +73,7 @@ def recover_models(folder: Path) -> None:
 
 def _export(
     reconstructions: Sequence[pycolmap.Reconstruction],
-    colors: Mapping[int, Uint8Array],
+    colors: Mapping[int, Uint8Array] | None,
     folder: Path,
     text: bool,
     point_clouds: bool,
@@ -83,7 +84,8 @@ def _export(
     fresh.mkdir(parents=True)
     summaries = []
     for number, reconstruction in enumerate(reconstructions):
-        _color(reconstruction, colors, anew=point_clouds)
+        if colors is not None:
+            color_points(reconstruction, colors, reconstruction.point3D_ids())
         model = fresh / str(number)
         model.mkdir()
         reconstruction.write_binary(model)
@@ -188,13 +190,13 @@ def _replace(folder: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def _color(
-    reconstruction: pycolmap.Reconstruction, colors: Mapping[int, Uint8Array], *, anew: bool
+def color_points(
+    reconstruction: pycolmap.Reconstruction,
+    colors: Mapping[int, Uint8Array],
+    point_ids: Iterable[int],
 ) -> None:
-    """Give each point the mean colour of the keypoints in its track; if not ``anew``, those alone
-    that have none yet."""
-    for point in reconstruction.points3D.values():
-        if not anew and point.color.any():
-            continue
+    """Give points the mean colour of the keypoints in their tracks; ``colors`` as above."""
+    for point_id in point_ids:
+        point = reconstruction.point3D(point_id)
         seen = [colors[e.image_id][e.point2D_idx] for e in point.track.elements]
         point.color = np.mean(seen, axis=0).round().astype(np.uint8)

@@ -13,7 +13,13 @@ from typing import Any
 import pycolmap
 
 from sfm_front.errors import InputError, StorageError
-from sfm_front.exporters.colmap import STATE, damaged_file, export_models, recover_models
+from sfm_front.exporters.colmap import (
+    STATE,
+    color_points,
+    damaged_file,
+    export_models,
+    recover_models,
+)
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.types import ModelSummary, Uint8Array
@@ -43,6 +49,8 @@ class Snapshots:
     def __init__(self, folder: Path, interval_s: float) -> None:
         self._folder = folder
         self._interval_s = interval_s
+        # Model id → point id; later points have higher ones.
+        self._last_colored: dict[int, int] = {}
         self._began = time.monotonic()
         self._next = self._began + min(interval_s, _FIRST_S)
 
@@ -71,9 +79,12 @@ class Snapshots:
                 "same command."
             )
         started = time.monotonic()
+        if not final:
+            for model in models:
+                self._color_new(model, colors)
         summaries = export_models(
             [model.reconstruction for model in models],
-            colors,
+            colors if final else None,
             self._folder,
             text=text,
             point_clouds=final,
@@ -87,6 +98,14 @@ class Snapshots:
         wanted_s = max(_FIRST_S, (now - self._began) * _SHARE_OF_AGE)
         self._next = now + max(min(self._interval_s, wanted_s), (now - started) / _MAX_SHARE)
         return summaries
+
+    def _color_new(self, model: Model, colors: Mapping[int, Uint8Array]) -> None:
+        """Colour points that have come since the last time; those read from disk have theirs."""
+        reconstruction, since = model.reconstruction, self._last_colored.get(model.model_id, 0)
+        point_ids = reconstruction.point3D_ids()
+        new = [i for i in point_ids if i > since and not reconstruction.point3D(i).color.any()]
+        color_points(reconstruction, colors, new)
+        self._last_colored[model.model_id] = max(point_ids, default=0)
 
 
 def read_snapshot(folder: Path) -> Snapshot | None:

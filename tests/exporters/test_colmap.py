@@ -167,7 +167,7 @@ class Broken:
         return getattr(self._model, name)
 
 
-@pytest.mark.parametrize("at", ["points3D", "write_binary", "export_PLY"])
+@pytest.mark.parametrize("at", ["point3D_ids", "write_binary", "export_PLY"])
 def test_a_crash_leaves_the_models_that_were_there(orbit, tmp_path, at):
     colors = colors_of(orbit, 3)
     export_models([make_model(orbit, 2)], colors, tmp_path / "sparse")

@@ -11,6 +11,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pycolmap
 import pytest
 from helpers.locations import ROOT, TESTS
@@ -301,6 +302,20 @@ def test_another_folder_is_added_only_when_wanted(database, folder, tmp_path):
     # Each folder keeps the names it was given.
     assert named(second, folder)[0] == "flight1/a.jpg"
     assert named(first, folder)[0] == "flight/a.jpg"
+
+
+def test_points_have_their_colours_while_a_session_runs(photos, tmp_path):
+    output = tmp_path / "out"
+    for given in (photos[:5], photos[5:8]):
+        with Session(output, options(snapshot_seconds=1e-9), resume=True) as session:
+            for photo in given:
+                session.add_extracted(photo)
+        model = pycolmap.Reconstruction(output / "sparse" / "0")
+        colors = {i: photos[i - 1].features.colors for i in model.reg_image_ids()}
+        for point in model.points3D.values():
+            seen = [colors[e.image_id][e.point2D_idx] for e in point.track.elements]
+            low, high = np.min(seen, axis=0), np.max(seen, axis=0)
+            assert np.all((low <= point.color) & (point.color <= high))
 
 
 def test_photos_at_the_top_of_folders_are_in_one_for_cameras(database, tmp_path):
