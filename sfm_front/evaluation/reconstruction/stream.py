@@ -164,11 +164,14 @@ def run_stream(
         started = perf_counter()
         models = [model.reconstruction for model in session.finish().models]
         finish_seconds = perf_counter() - started
-    peak = peak_resident_bytes()
+    # The kernel counts by the batch: what it says of the same peak later may be a little less.
+    peaks = [peak for peak in (peak_in_stream, peak_resident_bytes()) if peak is not None]
     return StreamResult(
         photos=tuple(costs),
         finish_seconds=finish_seconds,
-        memory=Memory(at_start, peak_in_stream, peak, colmap_memory_bytes(output)),
+        memory=Memory(
+            at_start, peak_in_stream, max(peaks, default=None), colmap_memory_bytes(output)
+        ),
         num_registered=max((int(model.num_reg_images()) for model in models), default=0),
         auc=tuple(auc(pose_errors(scene.truth(), models))),
     )

