@@ -27,8 +27,8 @@ def keep_freed_memory() -> bool:
         _M_MMAP_THRESHOLD: 2**25,
         # The main heap keeps its free end up to here.
         _M_TRIM_THRESHOLD: 2**30,
-        # The other heaps have 64 MiB each: one that is empty is kept if a smaller pad would not be
-        # left over.
+        # Threads have heaps of 64 MiB: an empty one goes back only if the one before it has more
+        # than this left.
         _M_TOP_PAD: 2**26,
     }
     return all(mallopt(name, value) for name, value in settings.items())
