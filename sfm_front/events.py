@@ -62,8 +62,8 @@ class ModelDropped:
 class ModelRefined:
     """A whole model was refined, in ``seconds`` of wall time.
 
-    ``median_shift`` and ``max_shift``: how far the cameras of its photos moved, in the model's
-    units.
+    ``median_shift`` and ``max_shift``: how far the cameras of its photos moved against each other,
+    in units of the model before.
     """
 
     model_id: int
