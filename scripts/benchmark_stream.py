@@ -98,7 +98,7 @@ def format_result(result: StreamResult) -> str:
         f"CPU seconds follow the photo's number to the power {result.exponent(100):.2f}",
         "memory per photo: " + ("-" if per_photo is None else f"{per_photo / 2**20:.2f} MiB"),
         f"memory in MiB: {_mib(result.memory.at_start)} before the first photo, at most "
-        f"{_mib(result.memory.peak_in_stream)} while they came, {_mib(result.memory.peak)} at all; "
+        f"{_mib(result.peak_in_stream)} while they came, {_mib(result.memory.peak)} at all; "
         f"of that pycolmap's graph and models {_mib(result.memory.colmap)}",
         f"end of the session: {result.finish_seconds:.1f} s",
         f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}",

@@ -49,14 +49,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _draw(output: Path, photos: Path | None, name1: str, name2: str, file: Path) -> None:
-    from sfm_front.reports.explanation import pair_matches, photo_file
+    from sfm_front.reports.explanation import pair_matches, photo_files
     from sfm_front.viewers.match_drawing import draw_matches
     from sfm_front.viewers.pictures import save
 
     matches = pair_matches(output, name1, name2)
-    file1, file2 = (
-        photo_file(output, name) if photos is None else photos / name for name in (name1, name2)
-    )
+    files = photo_files(output) if photos is None else {n: photos / n for n in (name1, name2)}
+    file1, file2 = files[name1], files[name2]
     for path in (file1, file2):
         if not path.is_file():
             raise InputError(f"{path}: no such photo. Give the folder where it is with --photos.")

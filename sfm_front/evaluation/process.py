@@ -65,21 +65,6 @@ def resident_bytes() -> int | None:
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-def peak_resident_bytes() -> int | None:
-    """The most memory this process has held so far; None on systems without /proc."""
-    try:
-        return _high_water_bytes(Path("/proc/self/status").read_text())
-    except OSError:
-        return None
-
-
-def _high_water_bytes(status: str) -> int | None:
-    for line in status.splitlines():
-        if line.startswith("VmHWM:"):
-            return int(line.split()[1]) * 1024
-    return None
-
-
 class _Peak:
     """The kernel's high-water mark, polled because it disappears with the process.
 
@@ -96,5 +81,7 @@ class _Peak:
                 text = status.read_text()
             except OSError:
                 return
-            self.bytes = _high_water_bytes(text) or self.bytes
+            for line in text.splitlines():
+                if line.startswith("VmHWM:"):
+                    self.bytes = int(line.split()[1]) * 1024
             ended.wait(_POLL_SECONDS)

@@ -95,7 +95,7 @@ class BackgroundAdjuster(Closeable):
 
     def result(self, ticket: int) -> pycolmap.Reconstruction | None:
         """The adjusted copy; None if it is still under way, failed, or another one came since."""
-        if self.is_busy or ticket != self._ticket:
+        if self.is_busy or self.is_broken or ticket != self._ticket:
             return None
         return pycolmap.Reconstruction(self._model)
 
@@ -130,3 +130,5 @@ class BackgroundAdjuster(Closeable):
         """Models are refined in the turn of a photo from now on."""
         logger.warning("the process that refines models has ended, or does not answer")
         self.is_broken = True
+        if self._process is not None:
+            self._process.kill()

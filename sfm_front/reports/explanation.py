@@ -18,7 +18,7 @@ from sfm_front.reports.report_json import read_report
 from sfm_front.reports.retrieval_log import read_candidates
 from sfm_front.reports.run_summary import Outcome, RunSummary
 from sfm_front.storage.colmap_models import read_model
-from sfm_front.storage.database import PhotoDatabase
+from sfm_front.storage.database import DATABASE, PhotoDatabase
 from sfm_front.types import CandidateOutcome, Features, Float64Array, Skipped, Uint32Array, View
 
 
@@ -104,7 +104,7 @@ def explain(output: Path, name: str) -> Explanation:
     photo = _photo(summary, name, output)
     if isinstance(photo, Skipped):
         return Explanation(name, str(photo), 0, (), {}, None, 0, "")
-    with pycolmap.Database.open(output / "database.db") as database:
+    with pycolmap.Database.open(output / DATABASE) as database:
         ids = {image.name: image.image_id for image in database.read_all_images()}
         candidates = tuple(
             _verdict_of(database, ids, name, candidate)
@@ -129,13 +129,10 @@ def explain(output: Path, name: str) -> Explanation:
     )
 
 
-def photo_file(output: Path, name: str) -> Path:
-    """Where a photo of an output was when it was taken in. Raises InputError if it has none."""
-    with PhotoDatabase(output / "database.db") as database:
-        for photo in database.photos():
-            if photo.name == name:
-                return photo.path
-    raise InputError(f"{output}: {name} is not in its database: nothing to draw")
+def photo_files(output: Path) -> dict[str, Path]:
+    """Where the photos of an output were when they were taken in, by name."""
+    with PhotoDatabase(output / DATABASE) as database:
+        return {photo.name: photo.path for photo in database.photos()}
 
 
 def pair_matches(output: Path, name1: str, name2: str) -> PairMatches:
@@ -143,7 +140,7 @@ def pair_matches(output: Path, name1: str, name2: str) -> PairMatches:
 
     Raises InputError if the database lacks one of the photos.
     """
-    with pycolmap.Database.open(output / "database.db") as database:
+    with pycolmap.Database.open(output / DATABASE) as database:
         images = {image.name: image for image in database.read_all_images()}
         for name in (name1, name2):
             if name not in images:

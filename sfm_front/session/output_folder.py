@@ -11,14 +11,14 @@ from sfm_front.errors import InputError
 from sfm_front.exporters.colmap import STATE
 from sfm_front.reports import event_log, report_json, retrieval_log
 from sfm_front.storage.atomic import is_partial
+from sfm_front.storage.database import DATABASE
 from sfm_front.storage.session_lock import SessionLock
 
 _MARKER = retrieval_log.FILE
-DATABASE = "database.db"
 _FILES = (
     DATABASE,
-    "database.db-shm",
-    "database.db-wal",
+    f"{DATABASE}-shm",
+    f"{DATABASE}-wal",
     event_log.FILE,
     report_json.FILE,
     _MARKER,

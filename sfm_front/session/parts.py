@@ -23,11 +23,10 @@ from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.announcer import Announcer
 from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.output_folder import DATABASE
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.session.photo_folders import PhotoFolders
 from sfm_front.session.snapshots import Snapshot
-from sfm_front.storage.database import PhotoDatabase
+from sfm_front.storage.database import DATABASE, PhotoDatabase
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import Any, overload
 
 from sfm_front.errors import InputError
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.output_folder import DATABASE, check_output_folder, holds_session
+from sfm_front.session.output_folder import check_output_folder, holds_session
 from sfm_front.session.photo_folders import PhotoFolders
-from sfm_front.storage.database import PhotoDatabase
+from sfm_front.storage.database import DATABASE, PhotoDatabase
 from sfm_front.storage.json_files import as_json
 from sfm_front.storage.session_lock import SessionLock
 from sfm_front.types import FileState, NotYet, PhotoPath

@@ -44,6 +44,9 @@ from sfm_front.types import (
     Uint8Array,
 )
 
+DATABASE = "database.db"
+"""Its name in an output."""
+
 
 class PhotoDatabase(Closeable):
     """Writes photos to a COLMAP database that COLMAP's own tools can go on with.

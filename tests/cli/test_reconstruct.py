@@ -323,6 +323,7 @@ def test_the_same_command_again_has_nothing_to_do(five, tmp_path, capsys):
     assert {path: path.read_bytes() for path in (output / "sparse").rglob("*.bin")} == before
 
 
+@pytest.mark.usefixtures("handlers")
 def test_an_interrupted_run_is_continued_by_the_same_command(five, tmp_path, monkeypatch, capsys):
     output = tmp_path / "out"
     with monkeypatch.context() as patched:

@@ -110,6 +110,8 @@ def test_a_process_that_does_not_answer_is_not_waited_for_for_ever(grown, adjust
     adjuster.poll()
     assert adjuster.is_broken
     assert adjuster.result(ticket) is None
+    # It is not left to go on.
+    assert adjuster._process.wait(PATIENCE_S) != 0
 
 
 def moved(model: pycolmap.Reconstruction, by: pycolmap.Sim3d) -> pycolmap.Reconstruction:
@@ -186,14 +188,22 @@ class SlowAdjuster(BackgroundAdjuster):
                 super().poll()
 
 
+def grown_atlas(
+    orbit: SyntheticScene, events: list[ModelEvent], adjuster: BackgroundAdjuster | None
+) -> tuple[Atlas, SceneFeed]:
+    """All photos, one after the other."""
+    feed = SceneFeed(orbit)
+    options = AtlasOptions(mapper=MapperOptions(num_threads=2))
+    atlas = Atlas(feed.scene, options, events.append, adjuster)
+    for index in range(NUM_PHOTOS):
+        atlas.add(feed.add(index))
+    return atlas, feed
+
+
 def test_photos_that_come_meanwhile_do_not_wait_and_the_model_is_as_true(orbit):
     events: list[ModelEvent] = []
-    feed = SceneFeed(orbit)
     with SlowAdjuster() as adjuster:
-        options = AtlasOptions(mapper=MapperOptions(num_threads=2))
-        atlas = Atlas(feed.scene, options, events.append, adjuster)
-        for index in range(NUM_PHOTOS):
-            atlas.add(feed.add(index))
+        atlas, _ = grown_atlas(orbit, events, adjuster)
         in_stream = [event for event in events if isinstance(event, ModelRefined)]
         assert adjuster.polls > 3
         assert any(event.max_shift > 0 for event in in_stream)
@@ -205,12 +215,8 @@ def test_photos_that_come_meanwhile_do_not_wait_and_the_model_is_as_true(orbit):
 
 def test_settling_goes_on_in_the_background(orbit):
     events: list[ModelEvent] = []
-    feed = SceneFeed(orbit)
     with BackgroundAdjuster() as adjuster:
-        options = AtlasOptions(mapper=MapperOptions(num_threads=2))
-        atlas = Atlas(feed.scene, options, events.append, adjuster)
-        for index in range(NUM_PHOTOS):
-            atlas.add(feed.add(index))
+        atlas, feed = grown_atlas(orbit, events, adjuster)
         wait_for(adjuster)
         atlas.add(feed.add(0))
         events.clear()
@@ -229,18 +235,11 @@ def test_settling_goes_on_in_the_background(orbit):
 
 def test_without_the_process_models_are_refined_in_the_turn_of_a_photo(orbit):
     events: list[ModelEvent] = []
-    feed = SceneFeed(orbit)
+    alone: list[ModelEvent] = []
     with BackgroundAdjuster() as adjuster:
         adjuster.is_broken = True
-        options = AtlasOptions(mapper=MapperOptions(num_threads=2))
-        atlas = Atlas(feed.scene, options, events.append, adjuster)
-        for index in range(NUM_PHOTOS):
-            atlas.add(feed.add(index))
-        alone: list[ModelEvent] = []
-        again = SceneFeed(orbit)
-        expected = Atlas(again.scene, options, alone.append)
-        for index in range(NUM_PHOTOS):
-            expected.add(again.add(index))
+        grown_atlas(orbit, events, adjuster)
+    grown_atlas(orbit, alone, None)
     refined, of_one = (
         [event.num_registered for event in told if isinstance(event, ModelRefined)]
         for told in (events, alone)

@@ -11,7 +11,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pycolmap
 import pytest
 from helpers.locations import ROOT, TESTS
@@ -22,7 +21,6 @@ from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import Event, ModelStarted, PhotoAdded, SessionEnded, SessionStarted
 from sfm_front.session import snapshots
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.photo_folders import PhotoFolders
 from sfm_front.session.resume import Newcomers, is_finished
 from sfm_front.session.session import Session, SessionResult
 from sfm_front.storage.database import PhotoDatabase
@@ -302,50 +300,6 @@ def test_another_folder_is_added_only_when_wanted(database, folder, tmp_path):
     # Each folder keeps the names it was given.
     assert named(second, folder)[0] == "flight1/a.jpg"
     assert named(first, folder)[0] == "flight/a.jpg"
-
-
-def test_points_have_their_colours_while_a_session_runs(photos, tmp_path):
-    output = tmp_path / "out"
-    for given in (photos[:5], photos[5:8]):
-        with Session(output, options(snapshot_seconds=1e-9), resume=True) as session:
-            for photo in given:
-                session.add_extracted(photo)
-        model = pycolmap.Reconstruction(output / "sparse" / "0")
-        colors = {i: photos[i - 1].features.colors for i in model.reg_image_ids()}
-        for point in model.points3D.values():
-            seen = [colors[e.image_id][e.point2D_idx] for e in point.track.elements]
-            low, high = np.min(seen, axis=0), np.max(seen, axis=0)
-            assert np.all((low <= point.color) & (point.color <= high))
-
-
-def test_photos_at_the_top_of_folders_are_in_one_for_cameras(database, tmp_path):
-    folders = PhotoFolders(database)
-    assert folders.folder_of("a.jpg") == "."
-    assert folders.folder_of("sub/a.jpg") == "sub"
-    assert folders.prefix(tmp_path / "first", []) == ""
-    assert folders.prefix(tmp_path / "sub", ["a.jpg", "sub/a.jpg"]) == "sub1/"
-    assert folders.folder_of("sub1/a.jpg") == "."
-    assert folders.folder_of("sub1/deeper/a.jpg") == "deeper"
-    assert folders.folder_of("sub/a.jpg") == "sub"
-
-
-def test_photos_without_exif_of_a_folder_that_is_added_share_the_camera(photos, tmp_path):
-    """As if they had come in one folder; so they do when the session is gone on with."""
-    for names in (["a.jpg", "b.jpg"], ["c.jpg"], ["d.jpg"]):
-        with Session(tmp_path / "out", options(), resume=True) as session:
-            where = tmp_path / names[0].removesuffix(".jpg")
-            newcomers = Newcomers(session.database, where, tmp_path / "out", append=True)
-            given = [PhotoPath(name, where / name) for name in names]
-            for photo, source in zip(newcomers.among(given, print), photos, strict=False):
-                session.add_extracted(replace(source, name=photo.name, digest=photo.name))
-    with PhotoDatabase(tmp_path / "out" / "database.db") as database:
-        assert [photo.name for photo in database.photos()] == [
-            "a.jpg",
-            "b.jpg",
-            "c/c.jpg",
-            "d/d.jpg",
-        ]
-        assert {photo.camera_id for photo in database.photos()} == {1}
 
 
 def test_a_session_that_is_left_says_so(photos, tmp_path):

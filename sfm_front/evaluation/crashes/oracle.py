@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from sfm_front.evaluation.crashes.colmap_view import ColmapView, colmap_view
-from sfm_front.exporters.colmap import STATE
+from sfm_front.exporters.colmap import STATE, damaged_file
 from sfm_front.reports.event_log import FILE as EVENTS
-from sfm_front.session.output_folder import DATABASE
+from sfm_front.storage.database import DATABASE
 
 _OURS = {"sfm_front_session", "sfm_front_photos", "sfm_front_skipped", "sfm_front_pairs"}
 # COLMAP's id of a pair is id1 * _PAIR + id2, of the lower id and the higher one.
@@ -174,6 +174,9 @@ def _model_violations(sparse: Path, view: ColmapView) -> Iterator[str]:
         return
     if len(state["models"]) != len(view.models) and not view.broken:
         yield f"{len(view.models)} models where {STATE} has {len(state['models'])}"
+    elif (damaged := damaged_file(sparse, state["files"])) is not None:
+        # pycolmap may read a model that is cut short, and take what lies in memory for the rest.
+        yield f"half model: {damaged} is not as long as {STATE} says"
     if state["num_photos"] > len(view.images):
         yield f"models of {state['num_photos']} photos, the database holds {len(view.images)}"
     for model, images in view.models.items():

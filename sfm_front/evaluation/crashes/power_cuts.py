@@ -28,7 +28,7 @@ from sfm_front.evaluation.crashes.wal import HEADER_BYTES, commit_ends, moved_un
 from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene
 from sfm_front.reports.event_log import FILE as EVENTS
 from sfm_front.runtime.subprocess_env import module_environment
-from sfm_front.session.output_folder import DATABASE
+from sfm_front.storage.database import DATABASE
 
 _CUTS_PER_COPY = 5
 _WAL, _SHARED_MEMORY = f"{DATABASE}-wal", f"{DATABASE}-shm"

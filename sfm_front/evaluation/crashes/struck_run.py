@@ -13,7 +13,7 @@ from pathlib import Path
 from sfm_front.evaluation.crashes.faults import Fault, strike
 from sfm_front.evaluation.crashes.oracle import events
 from sfm_front.runtime.subprocess_env import module_environment
-from sfm_front.session.output_folder import DATABASE
+from sfm_front.storage.database import DATABASE
 
 _POLL_S = 0.0005
 # Longer than any step of the scenes tried: a run that hangs is a violation, not a hang of ours.

@@ -28,9 +28,8 @@ def colmap_memory_bytes(output: Path) -> int | None:
 
 def _main(output: Path) -> None:
     from sfm_front.mapping.view_graph import ViewGraph
-    from sfm_front.session.output_folder import DATABASE
     from sfm_front.storage.colmap_models import read_model
-    from sfm_front.storage.database import PhotoDatabase
+    from sfm_front.storage.database import DATABASE, PhotoDatabase
 
     view_graph = ViewGraph()
     before = resident_bytes()

@@ -11,7 +11,7 @@ import numpy as np
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import auc, pose_errors
-from sfm_front.evaluation.process import peak_resident_bytes, resident_bytes
+from sfm_front.evaluation.process import resident_bytes
 from sfm_front.evaluation.reconstruction.colmap_memory import colmap_memory_bytes
 from sfm_front.evaluation.synthetic.scene import as_described, make_scene
 from sfm_front.events import PhotoAdded
@@ -50,12 +50,10 @@ class Growth:
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """Memory of the process in bytes: before the first photo, with the synthetic flight in it; the
-    most before the end of the session began, and at all; and, of that, pycolmap's correspondence
-    graph and models. All None on systems without /proc."""
+    """Bytes that the process held before the first photo, with the synthetic flight in it, and at
+    most; and, of that, pycolmap's correspondence graph and models. None where it cannot be told."""
 
     at_start: int | None
-    peak_in_stream: int | None
     peak: int | None
     colmap: int | None
 
@@ -112,6 +110,11 @@ class StreamResult:
         slope, _ = np.polyfit(np.log(numbers[start:]), np.log(total[start:]), 1)
         return float(slope) - 1
 
+    @property
+    def peak_in_stream(self) -> int | None:
+        """The most bytes held after a photo; the end of the session may need more."""
+        return max((photo.memory_bytes or 0 for photo in self.photos), default=0) or None
+
     def memory_per_photo(self, start: int) -> float | None:
         """Bytes per photo from ``start`` on: the slope of a fitted line."""
         memory = [photo.memory_bytes for photo in self.photos[start:]]
@@ -160,18 +163,15 @@ def run_stream(
                 )
             )
             note(added)
-        peak_in_stream = peak_resident_bytes()
         started = perf_counter()
-        models = [model.reconstruction for model in session.finish().models]
+        ended = session.finish()
         finish_seconds = perf_counter() - started
-    # The kernel counts by the batch: what it says of the same peak later may be a little less.
-    peaks = [peak for peak in (peak_in_stream, peak_resident_bytes()) if peak is not None]
+    models = [model.reconstruction for model in ended.models]
+    peak = ended.summary.totals.peak_memory_bytes
     return StreamResult(
         photos=tuple(costs),
         finish_seconds=finish_seconds,
-        memory=Memory(
-            at_start, peak_in_stream, max(peaks, default=None), colmap_memory_bytes(output)
-        ),
+        memory=Memory(at_start, peak, colmap_memory_bytes(output)),
         num_registered=max((int(model.num_reg_images()) for model in models), default=0),
         auc=tuple(auc(pose_errors(scene.truth(), models))),
     )

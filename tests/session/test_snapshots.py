@@ -1,0 +1,43 @@
+"""Models in sparse/ while a session runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pycolmap
+import pytest
+from helpers.photo_stream import described
+
+from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.session.options import SessionOptions
+from sfm_front.session.session import Session
+from sfm_front.types import ExtractedPhoto
+
+NUM_PHOTOS = 12
+
+
+def options(**changes: object) -> SessionOptions:
+    return SessionOptions(**({"global_descriptor": "vlad", "threads": 1} | changes))
+
+
+@pytest.fixture(scope="module")
+def orbit() -> SyntheticScene:
+    return make_scene(NUM_PHOTOS, 400, seed=1, layout="orbit", outlier_ratio=0.05)
+
+
+@pytest.fixture(scope="module")
+def photos(orbit) -> list[ExtractedPhoto]:
+    return [described(orbit, index) for index in range(NUM_PHOTOS)]
+
+
+def test_points_have_their_colours_while_a_session_runs(photos, tmp_path):
+    output = tmp_path / "out"
+    for given in (photos[:5], photos[5:8]):
+        with Session(output, options(snapshot_seconds=1e-9), resume=True) as session:
+            for photo in given:
+                session.add_extracted(photo)
+        model = pycolmap.Reconstruction(output / "sparse" / "0")
+        colors = {i: photos[i - 1].features.colors for i in model.reg_image_ids()}
+        for point in model.points3D.values():
+            seen = [colors[e.image_id][e.point2D_idx] for e in point.track.elements]
+            low, high = np.min(seen, axis=0), np.max(seen, axis=0)
+            assert np.all((low <= point.color) & (point.color <= high))
