@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pycolmap
 import pytest
 from helpers.photo_stream import described
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.session import snapshots
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
 from sfm_front.types import ExtractedPhoto
@@ -29,7 +32,9 @@ def photos(orbit) -> list[ExtractedPhoto]:
     return [described(orbit, index) for index in range(NUM_PHOTOS)]
 
 
-def test_points_have_their_colours_while_a_session_runs(photos, tmp_path):
+def test_points_have_their_colours_while_a_session_runs(photos, tmp_path, monkeypatch):
+    # One after each photo, however long the one before took.
+    monkeypatch.setattr(snapshots, "_MAX_SHARE", math.inf)
     output = tmp_path / "out"
     for given in (photos[:5], photos[5:8]):
         with Session(output, options(snapshot_seconds=1e-9), resume=True) as session:
