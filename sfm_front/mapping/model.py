@@ -124,6 +124,16 @@ class Model:
         """Make a photo just added to the view graph known to the model."""
         self._view_graph.extend(self._mapper, self.reconstruction, image_id)
 
+    def take_pairs(self, image_ids: Iterable[int]) -> None:
+        """Triangulate what pairs show that were added to the view graph after their photos.
+
+        ``image_ids``: the photos of these pairs. The model is not refined.
+        """
+        self._begin_anew()
+        for image_id in sorted(self.registered.intersection(image_ids)):
+            self._mapper.triangulate_image(self._triangulation, image_id)
+        self.forget_failures()
+
     def initialize(
         self, image_id1: int, image_id2: int, constraints: InitialPairConstraints
     ) -> bool:

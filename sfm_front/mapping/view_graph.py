@@ -47,8 +47,15 @@ class ViewGraph:
         cache.add_frame(trivial_frame(image))
         cache.add_image(image)
         self._neighbors[image_id] = {}
+        self.add_pairs(pairs)
+
+    def add_pairs(self, pairs: Iterable[PairGeometry]) -> None:
+        """Add verified pairs of photos that are there, none of which has been added before.
+
+        Models that hold these photos must be told: ``Model.take_pairs``.
+        """
         for pair in pairs:
-            cache.correspondence_graph.add_two_view_geometry(
+            self._cache.correspondence_graph.add_two_view_geometry(
                 pair.image_id1, pair.image_id2, pair.two_view_geometry
             )
             self._neighbors[pair.image_id1][pair.image_id2] = pair.num_inliers

@@ -86,11 +86,19 @@ class PhotoDatabase(Closeable):
                 self._file.insert(row)
             for row in photo_rows(image_id, photo, camera.camera_id):
                 self._file.insert(row)
-            for pair in pairs:
-                for row in pair_rows(pair):
-                    self._file.insert(row)
-                self._file.insert(pair_row(pair))
+            self._insert_pairs(pairs)
             self._file.insert(photo_row(image_id, photo, candidates))
+
+    def write_pairs(self, pairs: Sequence[PairGeometry]) -> None:
+        """Write pairs of photos that are there, found later: all of them, or none."""
+        with self._file.transaction():
+            self._insert_pairs(pairs)
+
+    def _insert_pairs(self, pairs: Sequence[PairGeometry]) -> None:
+        for pair in pairs:
+            for row in pair_rows(pair):
+                self._file.insert(row)
+            self._file.insert(pair_row(pair))
 
     def write_skipped(self, skipped: Skipped, path: Path) -> None:
         """Remember a file that is not used; a file of that name is written over."""

@@ -68,17 +68,24 @@ def centre_of(cam_from_world: pycolmap.Rigid3d) -> Float64Array:
 class SceneFeed:
     """Adds photos of a synthetic scene to a ``ViewGraph``, with their true pairs with earlier ones.
 
-    A photo gets the next free image id, counted from 1, and its name after ``prefix``.
+    A photo gets the next free image id, counted from 1, and its name after ``prefix``. With a
+    ``max_distance``, photos farther apart in the order of the scene have no pair.
     """
 
     def __init__(
-        self, synthetic: SyntheticScene, scene: ViewGraph | None = None, *, prefix: str = ""
+        self,
+        synthetic: SyntheticScene,
+        scene: ViewGraph | None = None,
+        *,
+        prefix: str = "",
+        max_distance: int | None = None,
     ) -> None:
         self.synthetic = synthetic
         self.scene = ViewGraph() if scene is None else scene
         self._prefix = prefix
+        self._max_distance = len(synthetic) if max_distance is None else max_distance
         self.index_of: dict[int, int] = {}
-        self._camera = pycolmap.Camera(synthetic.camera.todict())
+        self.camera = pycolmap.Camera(synthetic.camera.todict())
 
     def add(self, index: int) -> int:
         """Add photo ``index``; returns its image id."""
@@ -86,18 +93,19 @@ class SceneFeed:
         pairs = [
             true_pair(self.synthetic, index, other, (image_id, other_id))
             for other_id, other in self.index_of.items()
-            if len(true_matches(self.synthetic, index, other)) >= MIN_SHARED_POINTS
+            if abs(index - other) <= self._max_distance
+            and len(true_matches(self.synthetic, index, other)) >= MIN_SHARED_POINTS
         ]
         photo = self.synthetic.photo(index)
         name = self._prefix + photo.name
-        self.scene.add(image_id, name, self._camera, photo.features.keypoints, pairs)
+        self.scene.add(image_id, name, self.camera, photo.features.keypoints, pairs)
         self.index_of[image_id] = index
         return image_id
 
     def use_another_camera(self) -> None:
         """Give further photos a second camera with the same parameters."""
-        self._camera = pycolmap.Camera(self.synthetic.camera.todict())
-        self._camera.camera_id += 1
+        self.camera = pycolmap.Camera(self.synthetic.camera.todict())
+        self.camera.camera_id += 1
 
     def add_all(self, indices: Iterable[int]) -> list[int]:
         return [self.add(index) for index in indices]

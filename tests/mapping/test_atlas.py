@@ -170,7 +170,7 @@ class TruckFeed(SceneFeed):
             of_place, of_truck = place.photo(index).features, truck.photo(number).features
             keypoints = np.concatenate([of_place.keypoints, of_truck.keypoints])
             pairs = [self._truck_pair(number, other) for other in range(number)]
-            self.scene.add(number + 1, place.name(index), self._camera, keypoints, pairs)
+            self.scene.add(number + 1, place.name(index), self.camera, keypoints, pairs)
             self.index_of[number + 1] = index
 
     def _truck_pair(self, number: int, other: int) -> PairGeometry:
@@ -194,7 +194,7 @@ def test_a_bad_start_is_recovered_from(orbit):
 
 def test_a_wrong_focal_length_at_the_start_does_not_last(orbit):
     feed = SceneFeed(orbit)
-    feed._camera.params = [2.0 * 1300.0, 800.0, 600.0, 0.0]
+    feed.camera.params = [2.0 * 1300.0, 800.0, 600.0, 0.0]
     atlas = run(feed, range(NUM_PHOTOS))
     finish(atlas)
     assert_whole(atlas, orbit)

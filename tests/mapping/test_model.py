@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from helpers.photo_stream import SceneFeed, position_errors_m
+from helpers.photo_stream import SceneFeed, position_errors_m, true_pair
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
@@ -260,3 +260,32 @@ def test_values_out_of_range_are_refused_by_name(wrong):
 def test_a_model_of_no_points_cannot_be_asked_for():
     with pytest.raises(ConfigError, match="min_points"):
         InitialPairConstraints(min_angle_deg=10, min_inliers=50, min_points=0)
+
+
+def test_pairs_that_come_late_place_the_photo_they_lead_to(orbit):
+    feed = SceneFeed(orbit)
+    feed.add_all(range(4))
+    keypoints = orbit.photo(4).features.keypoints
+    feed.scene.add(5, orbit.name(4), feed.camera, keypoints, [])
+    model = started(feed)
+    model.grow(range(1, 6))
+    assert model.registered == {1, 2, 3, 4}
+    feed.scene.add_pairs([true_pair(orbit, 4, other, (5, other + 1)) for other in (2, 3)])
+    model.take_pairs([3, 4, 5])
+    assert model.grow([5]) == [5]
+    assert position_errors_m(model.reconstruction, orbit).max() < POSITION_TOLERANCE_M
+
+
+def test_pairs_that_come_late_between_registered_photos_add_observations(orbit):
+    feed = SceneFeed(orbit, max_distance=1)
+    ids = feed.add_all(range(8))
+    model = started(feed)
+    model.grow(ids)
+    assert model.registered == set(ids)
+    model.refine()
+    before = model.reconstruction.compute_num_observations()
+    feed.scene.add_pairs([true_pair(orbit, i + 1, i - 1, (i + 2, i)) for i in range(1, 7)])
+    model.take_pairs(ids)
+    model.refine()
+    assert model.reconstruction.compute_num_observations() > 1.1 * before
+    assert position_errors_m(model.reconstruction, orbit).max() < POSITION_TOLERANCE_M

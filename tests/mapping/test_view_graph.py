@@ -96,7 +96,7 @@ def test_a_mapper_can_be_told_of_later_photos(feed):
 def test_a_later_photo_may_bring_a_new_camera(orbit, feed):
     mapper, model = feed.scene.new_mapper()
     other = SceneFeed(orbit, feed.scene)
-    other._camera.camera_id = 9
+    other.camera.camera_id = 9
     image_id = other.add(5)
     feed.scene.extend(mapper, model, image_id)
     assert sorted(model.cameras) == [1, 9]
@@ -109,3 +109,14 @@ def test_points_are_the_keypoints(orbit):
     _, model = feed.scene.new_mapper()
     points = np.array([point.xy for point in model.images[1].points2D])
     np.testing.assert_array_equal(points, orbit.photo(3).features.keypoints[:, :2].astype(float))
+
+
+def test_pairs_may_come_after_their_photos(orbit):
+    late = SceneFeed(orbit)
+    late.add(0)
+    late.scene.add(2, "1.jpg", orbit.camera, orbit.photo(1).features.keypoints, [])
+    assert late.scene.neighbors(1) == {}
+    pair = true_pair(orbit, 1, 0, (2, 1))
+    late.scene.add_pairs([pair])
+    assert late.scene.pairs({1, 2}) == [(2, 1)]
+    assert late.scene.neighbors(1) == {2: pair.num_inliers}

@@ -145,6 +145,20 @@ def test_a_position_without_altitude_spoils_no_other(orbit, tmp_path):
     assert prior.position.ravel().tolist() == [10.0, 20.0, 30.0]
 
 
+def test_pairs_may_come_after_their_photos(orbit, tmp_path):
+    """They are read back after those that came with the photo."""
+    with PhotoDatabase(tmp_path / "database.db") as database:
+        for image_id in (1, 2):
+            database.write(image_id, described(orbit, image_id - 1), orbit.camera, [])
+        pairs = [true_pair(orbit, 2, other, (3, other + 1)) for other in (1, 0)]
+        database.write(3, described(orbit, 2), orbit.camera, pairs[:1])
+        database.write_pairs(pairs[1:])
+        assert [pair.image_id2 for pair in database.pairs(3)] == [2, 1]
+    with pycolmap.Database.open(tmp_path / "database.db") as opened:
+        read = opened.read_two_view_geometry(3, 1)
+    np.testing.assert_array_equal(read.inlier_matches, pairs[1].matches)
+
+
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
 def test_a_write_that_fails_leaves_nothing_of_the_photo(orbit, tmp_path, error):
     file = tmp_path / "database.db"
