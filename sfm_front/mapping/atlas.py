@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import pycolmap
@@ -42,6 +42,8 @@ class AtlasOptions:
     # Restarts that may register over half as many photos as the best model, but no more than it,
     # before giving up.
     max_failures: int = 1
+    # Both may be more in small models, as long as restarts register no more photos than this.
+    cheap_restarts: int = 40
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
@@ -53,7 +55,7 @@ class AtlasOptions:
         for name in ("max_missed_share", "min_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be from 0 to 1, got {getattr(self, name)}")
-        for name in ("fresh_starts", "max_failures"):
+        for name in ("fresh_starts", "max_failures", "cheap_restarts"):
             if getattr(self, name) < 0:
                 raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}")
 
@@ -148,6 +150,17 @@ class Atlas:
         if image_id in self.waiting:
             self._start_near(image_id)
         return sorted(self.registered - before)
+
+    def take_pairs(self, pairs: Sequence[PairGeometry]) -> None:
+        """Take in pairs of photos that are there already, and place all that can be placed."""
+        self.view_graph.add_pairs(pairs)
+        image_ids = sorted({i for pair in pairs for i in (pair.image_id1, pair.image_id2)})
+        for model in self.models:
+            model.take_pairs(image_ids)
+        self.grow()
+        for image_id in image_ids:
+            if image_id in self.waiting:
+                self._start_near(image_id)
 
     def locate(self, view: View, pairs: Iterable[PairGeometry]) -> PosedCamera | None:
         """Pose in the largest model of a photo that is not in the view graph yet, by these pairs.

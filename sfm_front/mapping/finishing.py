@@ -46,8 +46,10 @@ class _Finishing:
         better of old and new stays.
         """
         failures = 0
-        starts = self._initializer.best_starts(self._options.fresh_starts)
-        while failures < self._options.max_failures and self._misses_photos():
+        affordable = self._options.cheap_restarts // max(1, len(self._view_graph))
+        starts = self._initializer.best_starts(max(self._options.fresh_starts, affordable))
+        max_failures = max(self._options.max_failures, affordable)
+        while failures < max_failures and self._misses_photos():
             fresh = next(starts, None)
             if fresh is None:
                 return

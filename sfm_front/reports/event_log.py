@@ -14,6 +14,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``photo_waiting`` | it fits no model yet, and why |
 | ``model_started``, ``model_refined``, ``model_dropped`` | what became of a model |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
+| ``looked_again`` | a poorly connected photo was matched with more: ``found`` overlap |
 | ``session_ended`` | ``finished``: whether all models are written |
 
 New fields and events leave the version as it is; readers pass over what they do not know.
@@ -33,6 +34,7 @@ from typing import IO, Any
 from sfm_front.errors import StorageError
 from sfm_front.events import (
     Event,
+    LookedAgain,
     ModelDropped,
     ModelRefined,
     ModelStarted,
@@ -63,6 +65,7 @@ _NAMES: dict[type, str] = {
     ModelRefined: "model_refined",
     ModelDropped: "model_dropped",
     RegisteredStructureLess: "registered_structure_less",
+    LookedAgain: "looked_again",
     SessionEnded: "session_ended",
 }
 

@@ -25,6 +25,7 @@ from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.session.photo_folders import PhotoFolders
+from sfm_front.session.second_look import SecondLook
 from sfm_front.session.snapshots import Snapshot
 from sfm_front.storage.database import DATABASE, PhotoDatabase
 
@@ -41,6 +42,7 @@ class SessionParts:
     catalog: PhotoCatalog
     view_graph: ViewGraph
     atlas: Atlas
+    second_look: SecondLook
     report: RunReport
 
 
@@ -77,16 +79,31 @@ def open_parts(
     # With one thread a session is the same to the bit each time: nothing runs beside it.
     adjuster = opened.enter_context(BackgroundAdjuster()) if threads > 1 else None
     cameras = CameraCatalog(options.cameras, PhotoFolders(database).folder_of)
+    catalog = PhotoCatalog(cameras, database.features, options.cache_bytes)
+    retriever = Retriever(options.retrieval, descriptor.dimension)
     view_graph = ViewGraph()
+    atlas = Atlas(view_graph, options.atlas, announcer.tell_of_model, adjuster)
+    second_look = SecondLook(
+        options.second_look,
+        retriever,
+        matcher,
+        verifier,
+        workers,
+        catalog,
+        database,
+        atlas,
+        announcer.tell_of_model,
+    )
     return SessionParts(
         extraction=extraction,
-        retriever=Retriever(options.retrieval, descriptor.dimension),
+        retriever=retriever,
         reranker=reranker,
         pairs=pairs,
         database=database,
-        catalog=PhotoCatalog(cameras, database.features, options.cache_bytes),
+        catalog=catalog,
         view_graph=view_graph,
-        atlas=Atlas(view_graph, options.atlas, announcer.tell_of_model, adjuster),
+        atlas=atlas,
+        second_look=second_look,
         report=RunReport(),
     )
 
