@@ -35,6 +35,8 @@ class AtlasOptions:
     min_model_size: int = 3
     # Share of linked photos that may be in no model without a restart.
     max_missed_share: float = 0.02
+    # Pairs with photos of the model by which a photo must be linked for that, in large models.
+    min_links: int = 3
     # Share of the photos linked to a model that it should register itself.
     min_share: float = 0.75
     # Restarts per constraint level that the end of a session may try.

@@ -10,6 +10,7 @@ from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
+from sfm_front.mapping.restart import Restart
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import make_matcher
@@ -42,6 +43,7 @@ class SessionParts:
     catalog: PhotoCatalog
     view_graph: ViewGraph
     atlas: Atlas
+    restart: Restart
     second_look: SecondLook
     report: RunReport
 
@@ -103,6 +105,7 @@ def open_parts(
         catalog=catalog,
         view_graph=view_graph,
         atlas=atlas,
+        restart=Restart(atlas),
         second_look=second_look,
         report=RunReport(),
     )

@@ -55,6 +55,8 @@ Result = TypeVar("Result")
 
 # Photos that follow each other faster than this must not wait for a refinement.
 _IDLE_AFTER_S = 2.0
+# A restart registers so many photos before it is asked again whether another one has come.
+_PHOTOS_AT_A_TIME = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +179,13 @@ class Session(Closeable):
             self._write_snapshot()
 
     def _settle(self) -> bool:
-        return self._parts.atlas.settle() and not self._parts.second_look.while_idle()
+        """Do what is next; True if nothing is left to be done."""
+        parts = self._parts
+        return (
+            parts.atlas.settle()
+            and not parts.second_look.while_idle()
+            and not parts.restart.go_on(_PHOTOS_AT_A_TIME)
+        )
 
     @property
     def idle_s(self) -> float:
@@ -217,7 +225,7 @@ class Session(Closeable):
         with clock.stage("look again"):
             self._placing_more(self._parts.second_look.at_end)
         with clock.stage("finish"):
-            self._placing_more(lambda: finish(self._parts.atlas))
+            self._placing_more(lambda: finish(self._parts.atlas, self._parts.restart))
         with clock.stage("export"):
             models = self._write_snapshot(final=True)
         waiting = self._parts.atlas.waiting
