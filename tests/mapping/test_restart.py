@@ -14,7 +14,7 @@ from sfm_front.mapping.initialization import InitializationOptions
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.restart import Restart
 
-NUM_PHOTOS = 12
+NUM_PHOTOS = 16
 POSITION_TOLERANCE_M = 0.15
 OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
 
@@ -77,6 +77,7 @@ def test_no_better_start_is_dropped_and_not_tried_for_ever(orbit):
         atlas.add(feed.add(index))
     lonely = poor_pair(orbit, feed)
     atlas.add(lonely)
+    atlas.refine_until_stable()
     assert atlas.waiting == [lonely]
     events.clear()
     restart = Restart(atlas)
