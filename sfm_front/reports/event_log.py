@@ -13,6 +13,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``photo_placed`` | model, ``cam_from_world``, camera, inliers, ``latency_s`` from arrival |
 | ``photo_waiting`` | it fits no model yet, and why |
 | ``model_started``, ``model_refined``, ``model_dropped`` | what became of a model |
+| ``models_joined`` | two became one: by which bridge photos, on how many common points |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
 | ``session_ended`` | ``finished``: whether all models are written |
 
@@ -35,6 +36,7 @@ from sfm_front.events import (
     Event,
     ModelDropped,
     ModelRefined,
+    ModelsJoined,
     ModelStarted,
     PhotoAdded,
     PhotoArrived,
@@ -62,6 +64,7 @@ _NAMES: dict[type, str] = {
     ModelStarted: "model_started",
     ModelRefined: "model_refined",
     ModelDropped: "model_dropped",
+    ModelsJoined: "models_joined",
     RegisteredStructureLess: "registered_structure_less",
     SessionEnded: "session_ended",
 }
