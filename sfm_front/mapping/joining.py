@@ -69,6 +69,7 @@ class Joiner:
         self._view_graph = view_graph
         self._options = options
         self._mapper_options = mapper_options
+        self._seed = mapper_options.seed
         self._emit = emit
         self._bridges_at_failure: dict[tuple[int, int], int] = {}
 
