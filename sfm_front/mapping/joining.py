@@ -26,13 +26,14 @@ from sfm_front.mapping.view_graph import ViewGraph
 class JoiningOptions:
     """When two models are joined."""
 
-    # Photos that a model must have to be joined to a larger one.
+    # Photos that a model must have beside those of the larger one it is joined to.
     min_photos: int = 3
-    # Common points, and the share of the matches that must show them.
+    # Common points that must agree on how the models lie to each other.
     min_matches: int = 20
-    min_share: float = 0.5
-    # Matches from which a bridge photo has a say, and the share of such photos that must agree.
+    # Matches from which a bridge photo has a say, the share of them by which it agrees, and the
+    # share of such photos that must: one never decides against another.
     min_bridge_matches: int = 8
+    min_share: float = 0.5
     min_agreeing: float = 0.6
     # Share of the observations of either model, and of the common points, that must be left when
     # the joined model has been refined.
@@ -87,7 +88,8 @@ class Joiner:
         for pair in combinations(range(len(left)), 2):
             first, second = (left[number] for number in pair)
             ids = first.model_id, second.model_id
-            if bridges[pair] == 0 or second.num_registered < self._options.min_photos:
+            own = second.registered - first.registered
+            if bridges[pair] == 0 or len(own) < self._options.min_photos:
                 continue
             if bridges[pair] < self._options.retry_growth * self._bridges_at_failure.get(ids, 0):
                 continue
@@ -143,18 +145,13 @@ class Joiner:
         options = self._options
         if len(np.unique(matches.ids[fits], axis=0)) < options.min_matches:
             return False
-        shares = [
-            fits[mine].mean()
+        agreeing = [
+            fits[mine].mean() >= options.min_share
             for bridge in np.unique(matches.bridges)
             for mine in [matches.bridges == bridge]
             if mine.sum() >= options.min_bridge_matches
         ]
-        agreeing = [share >= options.min_share for share in shares]
-        return bool(
-            fits.mean() >= options.min_share
-            and agreeing
-            and np.mean(agreeing) >= options.min_agreeing
-        )
+        return bool(agreeing) and bool(np.mean(agreeing) >= options.min_agreeing)
 
     def _is_sound(
         self,

@@ -12,6 +12,7 @@ from sfm_front.types import Float64Array
 
 _ALTITUDE_M = 100.0
 _FORWARD_OVERLAP, _SIDE_OVERLAP = 0.75, 0.65
+_RING_OVERLAP = 0.85  # one line alone has no photos beside it to rely on
 _HILLS_M = 6.0  # amplitude of each of the waves that make the hills
 _HILL_LENGTHS_M = (37.0, 61.0, 95.0, 170.0)
 _ORBIT_RADIUS_M, _BALL_RADIUS_M = 40.0, 12.0
@@ -123,7 +124,7 @@ def fly_ring(
     """A single round trip over hills: only its end meets its beginning."""
     width, depth = _footprint(camera)
     reach = 0.75 * float(np.hypot(width, depth))
-    radius = num_images * depth * (1 - _FORWARD_OVERLAP) / (2 * np.pi)
+    radius = num_images * depth * (1 - _RING_OVERLAP) / (2 * np.pi)
     angles = 2 * np.pi * np.arange(num_images) / num_images
     outward = np.column_stack([np.cos(angles), np.sin(angles)])
     courses = outward[:, ::-1] * (-1.0, 1.0)
