@@ -81,6 +81,30 @@ class ModelRefined:
 
 
 @dataclass(frozen=True, slots=True)
+class ModelsJoined:
+    """A model took in another one, which is no model of its own any more, in ``seconds``.
+
+    ``num_registered``: photos of either before. ``bridges``: image ids of the photos on whose
+    matches the join rests; ``num_matches``: points of both models that they show to be the same.
+    """
+
+    model_id: int
+    joined_model_id: int
+    num_registered: tuple[int, int]
+    bridges: tuple[int, ...]
+    num_matches: int
+    seconds: float
+
+    def __str__(self) -> str:
+        ours, theirs = self.num_registered
+        return (
+            f"model {self.joined_model_id} of {theirs} photos joined to model {self.model_id} of "
+            f"{ours}: {self.num_matches} common points by {len(self.bridges)} bridge photos, "
+            f"{self.seconds:.2f} s"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class RegisteredStructureLess:
     """Photos that see too few points were registered by two-view geometry."""
 
@@ -112,7 +136,12 @@ class LookedAgain:
 
 
 ModelEvent: TypeAlias = (
-    ModelStarted | ModelDropped | ModelRefined | RegisteredStructureLess | LookedAgain
+    ModelStarted
+    | ModelDropped
+    | ModelRefined
+    | ModelsJoined
+    | RegisteredStructureLess
+    | LookedAgain
 )
 
 

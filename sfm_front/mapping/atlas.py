@@ -18,6 +18,7 @@ from sfm_front.events import (
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
+from sfm_front.mapping.joining import Joiner, JoiningOptions
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import Model, ModelState
@@ -49,6 +50,7 @@ class AtlasOptions:
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
+    joining: JoiningOptions = field(default_factory=JoiningOptions)
 
     def __post_init__(self) -> None:
         for name in ("min_second_model", "min_model_size"):
@@ -65,9 +67,10 @@ class AtlasOptions:
 class Atlas:
     """All models of a session, largest first.
 
-    A photo may be in several models while they grow: the largest registers the photos of smaller
-    ones as soon as it sees them, and a model whose photos larger ones hold is dropped. This also
-    recovers from a bad start: a model grown from the photos that did not fit takes over the rest.
+    Models that photos link are joined. Where they do not fit each other, a photo may be in several
+    while they grow: the largest registers the photos of smaller ones as soon as it sees them, and a
+    model whose photos larger ones hold is dropped. This recovers from a bad start: a model grown
+    from the photos that did not fit takes over the rest.
     """
 
     def __init__(
@@ -90,6 +93,7 @@ class Atlas:
             self.emit,
             adjuster=adjuster,
         )
+        self._joiner = Joiner(view_graph, self.options.joining, self.options.mapper, self.emit)
         self.models: list[Model] = []
 
     def restore(self, models: Iterable[tuple[pycolmap.Reconstruction, ModelState]]) -> None:
@@ -184,8 +188,13 @@ class Atlas:
         return {image_id: posed for image_id, posed in found.items() if posed is not None}
 
     def grow(self) -> bool:
-        """Grow every model, the largest first; True if any grew."""
-        grew = False
+        """Join models that belong together, then grow each, the largest first.
+
+        True if any grew.
+        """
+        num_models = len(self.models)
+        self.models = self._joiner.join(self.models)
+        grew = len(self.models) < num_models
         for model in list(self.models):
             grew |= bool(model.grow(self.candidates_of(model)))
         self.drop_covered()
@@ -198,18 +207,16 @@ class Atlas:
         """
         if not all(model.settle() for model in self.models):
             return False
-        for model in self.models:
-            model.forget_failures()
+        self._forget_failures()
         return not self.grow()
 
     def refine_until_stable(self) -> None:
         """Grow and refine in turn until nothing more registers; failed photos are retried."""
-        for model in self.models:
-            model.forget_failures()
+        self._forget_failures()
         while self.grow():
             for model in self.models:
                 model.refine()
-                model.forget_failures()
+            self._forget_failures()
 
     def candidates_of(self, model: Model) -> list[int]:
         """Photos that a model may register; for the largest, those of smaller models too."""
@@ -234,6 +241,12 @@ class Atlas:
     def announce_drop(self, model: Model, reason: DropReason) -> None:
         """Emit that a model is no longer grown."""
         self.emit(ModelDropped(model.model_id, model.num_registered, reason))
+
+    def _forget_failures(self) -> None:
+        """Allow every photo and every join to be tried again."""
+        self._joiner.forget_failures()
+        for model in self.models:
+            model.forget_failures()
 
     def _start_near(self, image_id: int) -> None:
         """Start a model among waiting photos linked to this one, if a pair is good enough."""

@@ -58,7 +58,7 @@ class Model:
         self.model_id = 0
         self._view_graph = view_graph
         self._options = options
-        self._emit = emit
+        self.emit = emit
         self._adjuster = adjuster
         self._under_way: tuple[int, Before] | None = None
         self._streaming = options.streaming()
@@ -101,6 +101,15 @@ class Model:
             refined_points=refined_points,
             min_pose_inliers=self._mapping.abs_pose_min_num_inliers,
             refine_intrinsics=self._options.refine_intrinsics,
+        )
+
+    def succeeded_by(self, reconstruction: pycolmap.Reconstruction) -> Model:
+        """The same model with another reconstruction over its view graph.
+
+        It tells nobody of its refinements until it is given ``emit``.
+        """
+        return Model.restored(
+            self._view_graph, self._options, reconstruction, self.state, adjuster=self._adjuster
         )
 
     @property
@@ -204,6 +213,10 @@ class Model:
         """Bundle-adjust the whole model, complete and merge tracks, drop what does not fit."""
         self._refine(self._options.final(self.num_registered))
 
+    def refine_briefly(self) -> None:
+        """The same as far as a model needs it that goes on growing."""
+        self._refine(self._streaming)
+
     def settle(self) -> bool:
         """Refine the whole model unless that has been done since its last photo came.
 
@@ -289,9 +302,8 @@ class Model:
             return
         started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         neighbors = {
-            i: sorted(found, key=lambda j: -found[j])
+            i: self._view_graph.strongest_neighbors(i)
             for i in self.registered - before.poses.keys()
-            for found in [self._view_graph.neighbors(i)]
         }
         carry_over(self.reconstruction, before, refined, neighbors)
         self._begin_anew()
@@ -323,8 +335,8 @@ class Model:
     def _announce_refined(self, seconds: float, centers: Mapping[int, Float64Array]) -> None:
         """``centers``: where its photos stood before."""
         self._local.forget(self._mapper)
-        if self._emit is not None:
-            self._emit(
+        if self.emit is not None:
+            self.emit(
                 ModelRefined(
                     self.model_id,
                     self.num_registered,

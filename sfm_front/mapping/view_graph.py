@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable
 import pycolmap
 
 from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
-from sfm_front.types import Float32Array, PairGeometry
+from sfm_front.types import Float32Array, PairGeometry, Uint32Array
 
 
 class ViewGraph:
@@ -82,6 +82,17 @@ class ViewGraph:
     def neighbors(self, image_id: int) -> dict[int, int]:
         """Photos with a verified pair with this one → inliers of the pair."""
         return self._neighbors[image_id]
+
+    def strongest_neighbors(self, image_id: int) -> list[int]:
+        """Photos with a verified pair with this one, most inliers first."""
+        found = self._neighbors[image_id]
+        return sorted(found, key=lambda other: -found[other])
+
+    def matches(self, image_id1: int, image_id2: int) -> Uint32Array:
+        """(M, 2) keypoint indices in either photo: the inliers of a verified pair."""
+        graph = self._cache.correspondence_graph
+        matches: Uint32Array = graph.extract_matches_between_images(image_id1, image_id2)
+        return matches
 
     def pairs(self, among: Collection[int]) -> list[tuple[int, int]]:
         """Verified pairs of these photos, most inliers first; the later photo stands first."""

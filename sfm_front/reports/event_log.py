@@ -13,6 +13,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``photo_placed`` | model, ``cam_from_world``, camera, inliers, ``latency_s`` from arrival |
 | ``photo_waiting`` | it fits no model yet, and why |
 | ``model_started``, ``model_refined``, ``model_dropped`` | what became of a model |
+| ``models_joined`` | two became one: by which bridge photos, on how many common points |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
 | ``looked_again`` | a poorly connected photo was matched with more: ``found`` overlap |
 | ``session_ended`` | ``finished``: whether all models are written |
@@ -37,6 +38,7 @@ from sfm_front.events import (
     LookedAgain,
     ModelDropped,
     ModelRefined,
+    ModelsJoined,
     ModelStarted,
     PhotoAdded,
     PhotoArrived,
@@ -64,6 +66,7 @@ _NAMES: dict[type, str] = {
     ModelStarted: "model_started",
     ModelRefined: "model_refined",
     ModelDropped: "model_dropped",
+    ModelsJoined: "models_joined",
     RegisteredStructureLess: "registered_structure_less",
     LookedAgain: "looked_again",
     SessionEnded: "session_ended",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -69,7 +69,8 @@ class SceneFeed:
     """Adds photos of a synthetic scene to a ``ViewGraph``, with their true pairs with earlier ones.
 
     A photo gets the next free image id, counted from 1, and its name after ``prefix``. With a
-    ``max_distance``, photos farther apart in the order of the scene have no pair.
+    ``max_distance``, photos farther apart in the order of the scene have no pair; nor have those
+    that are not ``linked``.
     """
 
     def __init__(
@@ -79,11 +80,13 @@ class SceneFeed:
         *,
         prefix: str = "",
         max_distance: int | None = None,
+        linked: Callable[[int, int], bool] = lambda index, other: True,  # noqa: ARG005
     ) -> None:
         self.synthetic = synthetic
         self.scene = ViewGraph() if scene is None else scene
         self._prefix = prefix
         self._max_distance = len(synthetic) if max_distance is None else max_distance
+        self._linked = linked
         self.index_of: dict[int, int] = {}
         self.camera = pycolmap.Camera(synthetic.camera.todict())
 
@@ -91,9 +94,10 @@ class SceneFeed:
         """Add photo ``index``; returns its image id."""
         image_id = len(self.scene) + 1
         pairs = [
-            true_pair(self.synthetic, index, other, (image_id, other_id))
+            self.pair(index, other, (image_id, other_id))
             for other_id, other in self.index_of.items()
             if abs(index - other) <= self._max_distance
+            and self._linked(index, other)
             and len(true_matches(self.synthetic, index, other)) >= MIN_SHARED_POINTS
         ]
         photo = self.synthetic.photo(index)
@@ -101,6 +105,10 @@ class SceneFeed:
         self.scene.add(image_id, name, self.camera, photo.features.keypoints, pairs)
         self.index_of[image_id] = index
         return image_id
+
+    def pair(self, index: int, other: int, ids: tuple[int, int]) -> PairGeometry:
+        """What verification says of a photo and an earlier one."""
+        return true_pair(self.synthetic, index, other, ids)
 
     def use_another_camera(self) -> None:
         """Give further photos a second camera with the same parameters."""

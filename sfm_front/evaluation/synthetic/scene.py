@@ -11,10 +11,10 @@ import pycolmap
 from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
-from sfm_front.evaluation.synthetic.world import World, fly_orbit, fly_strip
+from sfm_front.evaluation.synthetic.world import World, fly_orbit, fly_ring, fly_strip
 from sfm_front.types import Exif, ExtractedPhoto, Features, Float32Array, Float64Array, Uint8Array
 
-Layout = Literal["orbit", "strip"]
+Layout = Literal["orbit", "strip", "ring"]
 
 # A point's strength is the same in all photos, up to this standard deviation.
 _STRENGTH_JITTER = 0.1
@@ -135,9 +135,10 @@ def make_scene(
 
     ``points_per_image``: approximate number of scene points in a photo's view. "orbit" circles a
     lumpy ball, and every photo sees the side that faces it; "strip" flies parallel lines over
-    hills, as a survey does, and the number of overlapping photos is bounded. A point in view is
-    detected with probability ``repeatability``, with noise of standard deviation ``noise_px`` along
-    each axis. ``outlier_ratio`` of the detections are moved anywhere in the photo but keep their
+    hills, as a survey does, and the number of overlapping photos is bounded; "ring" flies one round
+    over hills, and only its last photos see what its first ones saw. A point in view is detected
+    with probability ``repeatability``, with noise of standard deviation ``noise_px`` along each
+    axis. ``outlier_ratio`` of the detections are moved anywhere in the photo but keep their
     descriptor: they cause wrong matches. ``background_ratio`` of all keypoints show no scene point:
     they cause no matches. Raises ConfigError if a value is out of range.
     """
@@ -154,8 +155,10 @@ def make_scene(
         world, poses = fly_orbit(num_images, points_per_image, rng)
     elif layout == "strip":
         world, poses = fly_strip(num_images, points_per_image, camera, rng)
+    elif layout == "ring":
+        world, poses = fly_ring(num_images, points_per_image, camera, rng)
     else:
-        raise ConfigError(f'layout must be "orbit" or "strip", got {layout!r}')
+        raise ConfigError(f'layout must be "orbit", "strip" or "ring", got {layout!r}')
     return SyntheticScene(
         camera=camera,
         cams_from_world=poses,

@@ -12,6 +12,7 @@ from sfm_front.types import Float64Array
 
 _ALTITUDE_M = 100.0
 _FORWARD_OVERLAP, _SIDE_OVERLAP = 0.75, 0.65
+_RING_OVERLAP = 0.85  # one line alone has no photos beside it to rely on
 _HILLS_M = 6.0  # amplitude of each of the waves that make the hills
 _HILL_LENGTHS_M = (37.0, 61.0, 95.0, 170.0)
 _ORBIT_RADIUS_M, _BALL_RADIUS_M = 40.0, 12.0
@@ -101,35 +102,80 @@ def fly_strip(
     num_images: int, points_per_image: int, camera: pycolmap.Camera, rng: np.random.Generator
 ) -> tuple[World, tuple[pycolmap.Rigid3d, ...]]:
     """Parallel lines over hills, flown to and fro."""
-    width = _ALTITUDE_M * camera.width / camera.focal_length
-    depth = _ALTITUDE_M * camera.height / camera.focal_length
+    width, depth = _footprint(camera)
     # The picture's width is across the flight direction, as usual in a survey.
     step, spacing = depth * (1 - _FORWARD_OVERLAP), width * (1 - _SIDE_OVERLAP)
     photos_a_line = max(1, round(np.sqrt(num_images * spacing / step)))
     line, place = np.divmod(np.arange(num_images), photos_a_line)
     back = line % 2 == 1
     along = np.where(back, photos_a_line - 1 - place, place) * step
-    centres = np.column_stack([along, line * spacing, np.full(num_images, _ALTITUDE_M)])
-    centres += rng.normal(0.0, (1.0, 1.0, 2.0), centres.shape)
-    poses = []
-    for centre, turned in zip(centres, back, strict=True):
-        tilt = rng.normal(0.0, 0.02 * _ALTITUDE_M, 2)
-        target = np.array([*(centre[:2] + tilt), 0.0])
-        heading = np.array([-1.0 if turned else 1.0, 0.05 * rng.normal(), 0.0])
-        poses.append(_look(centre, target, up=heading))
+    centres = _in_wind(np.column_stack([along, line * spacing]), rng)
+    courses = np.column_stack([np.where(back, -1.0, 1.0), np.zeros(num_images)])
+    poses = _looking_down(centres, courses, rng)
     reach = 0.75 * float(np.hypot(width, depth))
     low, high = centres[:, :2].min(axis=0) - reach, centres[:, :2].max(axis=0) + reach
     count = round(points_per_image * float(np.prod(high - low)) / (width * depth))
-    ground = low + rng.random((count, 2)) * (high - low)
-    height = rng.gamma(1.0, 0.6, count)  # bushes and roofs
+    return _hills(low + rng.random((count, 2)) * (high - low), reach, rng), poses
+
+
+def fly_ring(
+    num_images: int, points_per_image: int, camera: pycolmap.Camera, rng: np.random.Generator
+) -> tuple[World, tuple[pycolmap.Rigid3d, ...]]:
+    """A single round trip over hills: only its end meets its beginning."""
+    width, depth = _footprint(camera)
+    reach = 0.75 * float(np.hypot(width, depth))
+    radius = num_images * depth * (1 - _RING_OVERLAP) / (2 * np.pi)
+    angles = 2 * np.pi * np.arange(num_images) / num_images
+    outward = np.column_stack([np.cos(angles), np.sin(angles)])
+    courses = outward[:, ::-1] * (-1.0, 1.0)
+    poses = _looking_down(_in_wind(radius * outward, rng), courses, rng)
+    inner, outer = max(0.0, radius - reach), radius + reach
+    count = round(points_per_image * np.pi * (outer**2 - inner**2) / (width * depth))
+    away = np.sqrt(rng.uniform(inner**2, outer**2, count))
+    around = rng.uniform(0.0, 2 * np.pi, count)
+    ground = away[:, None] * np.column_stack([np.cos(around), np.sin(around)])
+    return _hills(ground, reach, rng), poses
+
+
+def _footprint(camera: pycolmap.Camera) -> tuple[float, float]:
+    """Width and depth in metres of what a photo shows of flat ground."""
+    return (
+        _ALTITUDE_M * camera.width / camera.focal_length,
+        _ALTITUDE_M * camera.height / camera.focal_length,
+    )
+
+
+def _in_wind(route: Float64Array, rng: np.random.Generator) -> Float64Array:
+    """(N, 3) places that are flown through near these (N, 2)."""
+    centres = np.column_stack([route, np.full(len(route), _ALTITUDE_M)])
+    shaken: Float64Array = centres + rng.normal(0.0, (1.0, 1.0, 2.0), centres.shape)
+    return shaken
+
+
+def _looking_down(
+    centres: Float64Array, courses: Float64Array, rng: np.random.Generator
+) -> tuple[pycolmap.Rigid3d, ...]:
+    """Poses at ``centres`` (N, 3), the top of the picture towards ``courses`` (N, 2), roughly."""
+    poses = []
+    for centre, (east, north) in zip(centres, courses, strict=True):
+        tilt = rng.normal(0.0, 0.02 * _ALTITUDE_M, 2)
+        target = np.array([*(centre[:2] + tilt), 0.0])
+        heading = np.array([east, north + 0.05 * rng.normal(), 0.0])
+        poses.append(_look(centre, target, up=heading))
+    return tuple(poses)
+
+
+def _hills(ground: Float64Array, reach: float, rng: np.random.Generator) -> World:
+    """Points over the places ``ground`` (P, 2), as seen by photos that reach so far, in metres."""
+    height = rng.gamma(1.0, 0.6, len(ground))  # bushes and roofs
     for length in _HILL_LENGTHS_M:
         direction = rng.random() * 2 * np.pi
         phase = ground @ (np.cos(direction), np.sin(direction)) * (2 * np.pi / length)
         amplitude = _HILLS_M * length / max(_HILL_LENGTHS_M)
         height += amplitude * np.sin(phase + rng.random() * 2 * np.pi)
-    normals = np.tile((0.0, 0.0, 1.0), (count, 1))
+    normals = np.tile((0.0, 0.0, 1.0), (len(ground), 1))
     points = np.column_stack([ground, height])
-    return _tiled(points, normals, rng, tile_size_m=reach / 3, reach_m=reach), tuple(poses)
+    return _tiled(points, normals, rng, tile_size_m=reach / 3, reach_m=reach)
 
 
 def _look(centre: Float64Array, target: Float64Array, *, up: Float64Array) -> pycolmap.Rigid3d:

@@ -8,7 +8,7 @@ import pytest
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticPhoto, SyntheticScene, make_scene
 
-LAYOUTS = ["orbit", "strip"]
+LAYOUTS = ["orbit", "strip", "ring"]
 FLOAT32_PX = 1e-3  # what storing a pixel coordinate of up to 1600 as float32 may cost
 RATIO = 0.8  # Lowe's ratio test
 
