@@ -22,6 +22,7 @@ class Quality:
     ``points`` and ``reprojection_error_px`` are over all models. ``auc`` is that of the pose
     errors at 1, 3 and 5 degrees, in [0, 1]; None without ground truth. ``pairs_joined`` is the
     fraction of the pairs known to overlap with both photos in one model; None if none are known.
+    ``mixed`` counts models with photos of several landmarks; None if these are not known.
     """
 
     registered: int
@@ -31,6 +32,7 @@ class Quality:
     reprojection_error_px: float | None
     auc: tuple[float, ...] | None
     pairs_joined: float | None
+    mixed: int | None
 
 
 def assess(folders: Sequence[Path], scene: BenchmarkScene) -> Quality:
@@ -46,6 +48,7 @@ def assess(folders: Sequence[Path], scene: BenchmarkScene) -> Quality:
         reprojection_error_px=_reprojection_error_px(models) if points else None,
         auc=_auc(models, scene),
         pairs_joined=_pairs_joined(names, scene),
+        mixed=_mixed(names, scene),
     )
 
 
@@ -82,3 +85,10 @@ def _pairs_joined(names: Sequence[set[str]], scene: BenchmarkScene) -> float | N
         for first, second in scene.pairs
     )
     return joined / len(scene.pairs)
+
+
+def _mixed(names: Sequence[set[str]], scene: BenchmarkScene) -> int | None:
+    if scene.landmarks is None:
+        return None
+    landmarks = scene.landmarks
+    return sum(len({landmarks[name] for name in model}) > 1 for model in names)

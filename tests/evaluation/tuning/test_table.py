@@ -23,6 +23,7 @@ def trial(scene, arrangement, registered, auc=None, seconds=1.0):
         reprojection_error_px=0.5,
         auc=auc,
         pairs_joined=None,
+        mixed=None,
     )
     return Trial(
         scene=scene,
