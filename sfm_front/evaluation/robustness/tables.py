@@ -9,7 +9,7 @@ from sfm_front.evaluation.reconstruction.quality import Quality
 from sfm_front.evaluation.robustness.sparse import Comparison
 from sfm_front.evaluation.tuning.trials import Trial
 
-_AUC_DEG = 3.0
+_AUC = AUC_THRESHOLDS_DEG.index(3.0)
 
 
 def format_comparisons(comparisons: Sequence[Comparison]) -> str:
@@ -31,13 +31,18 @@ def format_comparisons(comparisons: Sequence[Comparison]) -> str:
 
 
 def format_orders(trials: Sequence[Trial]) -> str:
-    """A row per arrangement, a column per scene: photos in the largest model, pose AUC at 3 degrees
-    in percent, and models if they are several. The worst and the best of both stand below."""
-    cells = {(trial.arrangement, trial.scene): _worth(trial.quality) for trial in trials}
+    """A row per arrangement, a column per scene: photos in the largest model; pose AUC at 3 degrees
+    in percent, else its distance from GPS; models if they are several. Below the worst and the best
+    of each."""
+    cells = {
+        (trial.arrangement, trial.scene): _cell([trial.quality], max)
+        + (f" ({trial.quality.models} models)" if trial.quality.models > 1 else "")
+        for trial in trials
+    }
     for label, extreme in (("worst", min), ("best", max)):
         for scene in dict.fromkeys(trial.scene for trial in trials):
             qualities = [trial.quality for trial in trials if trial.scene == scene]
-            cells[label, scene] = _extreme(qualities, extreme)
+            cells[label, scene] = _cell(qualities, extreme)
     return "\n".join(_markdown("order", cells))
 
 
@@ -51,25 +56,16 @@ def _counts(one: Comparison) -> str:
     return f"{one.rival.registered}: {' '.join(ours)}"
 
 
-def _worth(quality: Quality) -> str:
-    """``11, 96.4`` or ``11, 96.4 (2 models)``."""
-    several = f" ({quality.models} models)" if quality.models > 1 else ""
-    return _figures(quality.registered, _auc(quality)) + several
-
-
-def _extreme(qualities: Sequence[Quality], extreme: Callable[[Iterable[float]], float]) -> str:
-    areas = [area for area in map(_auc, qualities) if area is not None]
-    return _figures(
-        extreme(quality.registered for quality in qualities), extreme(areas) if areas else None
-    )
-
-
-def _auc(quality: Quality) -> float | None:
-    return None if quality.auc is None else quality.auc[AUC_THRESHOLDS_DEG.index(_AUC_DEG)]
-
-
-def _figures(registered: float, area: float | None) -> str:
-    return f"{registered}" if area is None else f"{registered}, {100 * area:.1f}"
+def _cell(qualities: Sequence[Quality], extreme: Callable[[Iterable[float]], float]) -> str:
+    """The worst (min) or the best (max) of each figure: ``11, 96.4`` or ``75, 0.8 m``."""
+    text = str(extreme(quality.registered for quality in qualities))
+    areas = [quality.auc[_AUC] for quality in qualities if quality.auc is not None]
+    metres = [q.gps_residual_m for q in qualities if q.gps_residual_m is not None]
+    if areas:
+        text += f", {100 * extreme(areas):.1f}"
+    elif metres:
+        text += f", {-extreme(-value for value in metres):.1f} m"
+    return text
 
 
 def _markdown(corner: str, cells: dict[tuple[str, str], str]) -> list[str]:

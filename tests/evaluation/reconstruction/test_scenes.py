@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 from helpers.benchmark_folder import CAMERAS, noise_photos, write_model
+from helpers.model_building import looking
+from PIL import ExifTags, Image
 
 from sfm_front.errors import InputError
 from sfm_front.evaluation.reconstruction.quality import assess
@@ -111,6 +113,28 @@ def test_models_of_several_landmarks_are_counted(tmp_path):
     assert assess(folders[:2], scene).mixed == 0
     assert assess(folders, scene).mixed == 1
     assert assess(folders, replace(scene, landmarks=None)).mixed is None
+
+
+def test_gps_is_read_from_the_photos_of_the_largest_model(tmp_path):
+    photos = noise_photos(tmp_path / "photos")
+    scene = BenchmarkScene(name="scene", photos=photos, num_photos=4)
+    # Metres. At the equator a degree of the meridian has 110 574, one of longitude 111 320.
+    centres = [(0, 0, 100), (0, 30, 110), (40, 30, 100), (40, 0, 105)]
+    cameras = {
+        name: looking(centre, [0, 0, -1], [0, 1, 0])
+        for name, centre in zip(CAMERAS, centres, strict=True)
+    }
+    folders = [
+        write_model(tmp_path / "0", {"0.jpg": cameras["0.jpg"]}),
+        write_model(tmp_path / "1", cameras),
+    ]
+    assert assess(folders, scene).gps_residual_m is None
+    for name, (x, y, z) in zip(CAMERAS, centres, strict=True):
+        exif = Image.Exif()
+        place = {2: (0, 0, 3600 * y / 110574), 4: (10, 0, 3600 * x / 111320), 6: z}
+        exif.get_ifd(ExifTags.IFD.GPSInfo).update({1: "N", 3: "E", **place})
+        Image.open(photos / name).save(photos / name, exif=exif)
+    assert assess(folders, scene).gps_residual_m < 0.01
 
 
 def test_no_model_is_worth_nothing(tmp_path, photos):

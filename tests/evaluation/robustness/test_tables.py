@@ -10,7 +10,7 @@ from sfm_front.evaluation.robustness.tables import format_comparisons, format_or
 from sfm_front.evaluation.tuning.trials import Trial
 
 
-def quality(registered, *, auc=None, models=1, mixed=None):
+def quality(registered, *, auc=None, models=1, mixed=None, gps_residual_m=None):
     return Quality(
         registered=registered,
         registered_in_all=registered,
@@ -20,6 +20,7 @@ def quality(registered, *, auc=None, models=1, mixed=None):
         auc=auc,
         pairs_joined=None,
         mixed=mixed,
+        gps_residual_m=gps_residual_m,
     )
 
 
@@ -75,15 +76,16 @@ def test_orders_have_their_worst_and_best():
         [
             trial("door", "shuffle-1", quality(12, auc=(0.5, 0.9, 1.0))),
             trial("door", "shuffle-2", quality(9, auc=(0.6, 0.954, 1.0), models=2)),
-            trial("dunes", "shuffle-1", quality(38)),
-            trial("dunes", "shuffle-2", quality(41)),
+            trial("dunes", "shuffle-1", quality(38, gps_residual_m=0.8)),
+            trial("dunes", "shuffle-2", quality(41, gps_residual_m=12.04)),
+            trial("toys", "shuffle-1", quality(5)),
         ]
     )
     assert text.splitlines() == [
-        "| order | door | dunes |",
-        "| --- | --- | --- |",
-        "| shuffle-1 | 12, 90.0 | 38 |",
-        "| shuffle-2 | 9, 95.4 (2 models) | 41 |",
-        "| worst | 9, 90.0 | 38 |",
-        "| best | 12, 95.4 | 41 |",
+        "| order | door | dunes | toys |",
+        "| --- | --- | --- | --- |",
+        "| shuffle-1 | 12, 90.0 | 38, 0.8 m | 5 |",
+        "| shuffle-2 | 9, 95.4 (2 models) | 41, 12.0 m |  |",
+        "| worst | 9, 90.0 | 38, 12.0 m | 5 |",
+        "| best | 12, 95.4 | 41, 0.8 m | 5 |",
     ]

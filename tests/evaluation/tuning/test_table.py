@@ -24,6 +24,7 @@ def trial(scene, arrangement, registered, auc=None, seconds=1.0):
         auc=auc,
         pairs_joined=None,
         mixed=None,
+        gps_residual_m=None,
     )
     return Trial(
         scene=scene,
