@@ -39,11 +39,11 @@ def _check(photos: Sequence[PhotoPath], folder: Path, settings: BenchmarkSetting
         with_settings = [task[name] for name in _DECISIVE]
         of_photos = {photo.name for photo in list_photos(folder / "images")}
     except (OSError, ValueError, KeyError, InputError) as error:
-        raise InputError(f"{folder}: no results of COLMAP's in it; remove it") from error
+        raise InputError(f"{folder}: no results of COLMAP's in it; give another folder") from error
     if with_settings != [getattr(settings, name) for name in _DECISIVE]:
-        raise InputError(f"{folder}: built with other settings; remove it")
+        raise InputError(f"{folder}: built with other settings; give another folder")
     if of_photos != {photo.name for photo in photos}:
-        raise InputError(f"{folder}: built of other photos; remove it")
+        raise InputError(f"{folder}: built of other photos; give another folder")
 
 
 def _build(photos: Sequence[PhotoPath], folder: Path, settings: BenchmarkSettings) -> None:
