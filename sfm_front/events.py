@@ -81,6 +81,28 @@ class ModelRefined:
 
 
 @dataclass(frozen=True, slots=True)
+class LookAlikesRefused:
+    """Two groups of photos show things that look alike, and were taken for one place.
+
+    The matches that said so, ``num_matches``, are no longer believed; the groups of image ids, the
+    larger first, are two models until other matches join them. ``conflict``: share of what both
+    groups saw in which they saw different things.
+    """
+
+    model_id: int
+    image_ids: tuple[tuple[int, ...], tuple[int, ...]]
+    num_matches: int
+    conflict: float
+
+    def __str__(self) -> str:
+        first, second = (_listed(group) for group in self.image_ids)
+        return (
+            f"model {self.model_id} taken apart: images {first} and {second} show things that look "
+            f"alike in different surroundings; {self.num_matches} matches refused"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class RegisteredStructureLess:
     """Photos that see too few points were registered by two-view geometry."""
 
@@ -91,7 +113,9 @@ class RegisteredStructureLess:
         return f"{len(self.image_ids)} photos registered without structure in model {self.model_id}"
 
 
-ModelEvent: TypeAlias = ModelStarted | ModelDropped | ModelRefined | RegisteredStructureLess
+ModelEvent: TypeAlias = (
+    ModelStarted | ModelDropped | ModelRefined | LookAlikesRefused | RegisteredStructureLess
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,3 +227,14 @@ Listener: TypeAlias = Callable[[Event], None]
 
 # Stages of ``PhotoAdded.seconds`` that run ahead of a photo's turn, beside the mapping of others.
 PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})
+
+
+def _listed(image_ids: tuple[int, ...]) -> str:
+    """Consecutive numbers as ranges: 1-7, 9."""
+    runs: list[list[int]] = []
+    for image_id in image_ids:
+        if runs and image_id == runs[-1][-1] + 1:
+            runs[-1][1:] = [image_id]
+        else:
+            runs.append([image_id])
+    return ", ".join("-".join(map(str, run)) for run in runs)

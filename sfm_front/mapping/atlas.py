@@ -19,6 +19,7 @@ from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
+from sfm_front.mapping.lookalikes import FoldOptions
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.mapping.view_graph import ViewGraph
@@ -45,6 +46,7 @@ class AtlasOptions:
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
+    fold: FoldOptions = field(default_factory=FoldOptions)
 
     def __post_init__(self) -> None:
         for name in ("min_second_model", "min_model_size"):
@@ -167,6 +169,18 @@ class Atlas:
         model = self.models[0].reconstruction
         found = {image_id: registered_photo(model, image_id) for image_id in image_ids}
         return {image_id: posed for image_id, posed in found.items() if posed is not None}
+
+    def replace(self, model: Model, parts: Iterable[Model]) -> None:
+        """Put parts in the place of a model, after matches have left the view graph: the first keeps
+        its id."""
+        first, *others = parts
+        first.model_id = model.model_id
+        for part in others:
+            part.model_id = self.initializer.next_id()
+        # Those over the view graph as it was would still see what has left it.
+        kept = [other.only(other.registered) for other in self.models if other is not model]
+        self.models = [first, *others, *kept]
+        self.drop_covered()
 
     def grow(self) -> bool:
         """Grow every model, the largest first; True if any grew."""

@@ -9,6 +9,7 @@ from sfm_front.events import DropReason, RegisteredStructureLess, StartKind
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.initialization import Initializer
 from sfm_front.mapping.model import Model
+from sfm_front.mapping.unfolding import unfold
 
 
 def finish(atlas: Atlas) -> None:
@@ -28,9 +29,11 @@ class _Finishing:
 
     def run(self) -> None:
         self._atlas.refine_until_stable()
+        unfold(self._atlas)
         self._restart_largest()
         self._start_remaining()
         self._fix_intrinsics()
+        unfold(self._atlas)
         self._drop_small()
         while self._register_structure_less():
             self._atlas.refine_until_stable()

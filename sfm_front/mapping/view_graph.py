@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 
+import numpy as np
 import pycolmap
 
 from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
-from sfm_front.types import Float32Array, PairGeometry
+from sfm_front.types import Float32Array, PairGeometry, Uint32Array
 
 
 class ViewGraph:
@@ -89,6 +90,36 @@ class ViewGraph:
         """
         angle_rad = self._angles_rad[pair]
         return math.degrees(angle_rad) if angle_rad >= 0 else None
+
+    def matches(self, pair: tuple[int, int]) -> Uint32Array:
+        """(M, 2) the inliers of a verified pair: indices of keypoints in its photos."""
+        graph = self._cache.correspondence_graph
+        return np.asarray(graph.extract_matches_between_images(*pair), np.uint32)
+
+    def keep_only(self, kept: Mapping[tuple[int, int], Uint32Array]) -> None:
+        """Leave verified pairs, named as by ``pairs``, only these (M, 2) of their matches; a pair
+        without any is taken out.
+
+        Mappers made before go on as if nothing had been taken: whoever has one must make it anew.
+        """
+        for (first, second), matches in kept.items():
+            self._neighbors[first][second] = self._neighbors[second][first] = len(matches)
+            if len(matches) == 0:
+                del self._neighbors[first][second], self._neighbors[second][first]
+                del self._angles_rad[first, second]
+        # pycolmap cannot take anything out.
+        old, self._cache = self._cache, pycolmap.DatabaseCache()
+        for camera in old.cameras.values():
+            self._cache.add_camera(camera)
+            self._cache.add_rig(old.rig(camera.camera_id))
+        for image_id in self._neighbors:
+            self._cache.add_frame(old.frame(image_id))
+            self._cache.add_image(old.image(image_id))
+        for pair in self._angles_rad:
+            geometry = old.correspondence_graph.extract_two_view_geometry(*pair, True)
+            if pair in kept:
+                geometry.inlier_matches = kept[pair]
+            self._cache.correspondence_graph.add_two_view_geometry(*pair, geometry)
 
     def component(self, start: Iterable[int], *, among: Collection[int] | None = None) -> set[int]:
         """Photos linked to the given ones by chains of verified pairs, these included.

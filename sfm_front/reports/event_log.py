@@ -13,6 +13,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``photo_placed`` | model, ``cam_from_world``, camera, inliers, ``latency_s`` from arrival |
 | ``photo_waiting`` | it fits no model yet, and why |
 | ``model_started``, ``model_refined``, ``model_dropped`` | what became of a model |
+| ``look_alikes_refused`` | two groups of photos that were taken for one place |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
 | ``session_ended`` | ``finished``: whether all models are written |
 
@@ -33,6 +34,7 @@ from typing import IO, Any
 from sfm_front.errors import StorageError
 from sfm_front.events import (
     Event,
+    LookAlikesRefused,
     ModelDropped,
     ModelRefined,
     ModelStarted,
@@ -62,6 +64,7 @@ _NAMES: dict[type, str] = {
     ModelStarted: "model_started",
     ModelRefined: "model_refined",
     ModelDropped: "model_dropped",
+    LookAlikesRefused: "look_alikes_refused",
     RegisteredStructureLess: "registered_structure_less",
     SessionEnded: "session_ended",
 }
