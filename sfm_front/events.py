@@ -80,25 +80,31 @@ class ModelRefined:
         )
 
 
+class Evidence(Enum):
+    """What shows that two groups of photos are not where a model has them."""
+
+    SURROUNDINGS = "beside what looks alike they see different things"
+    MATCHES = "most of the matches between them say otherwise"
+
+
 @dataclass(frozen=True, slots=True)
 class LookAlikesRefused:
-    """Two groups of photos show things that look alike, and were taken for one place.
+    """Two groups of photos show things that look alike, and had been taken for one place.
 
-    The matches that said so, ``num_matches``, are no longer believed; the groups of image ids, the
-    larger first, are two models until other matches join them. ``conflict``: share of what both
-    groups saw in which they saw different things.
+    The ``num_matches`` that said so are no longer believed. The groups of image ids, the larger
+    first, come together again only by other matches.
     """
 
     model_id: int
     image_ids: tuple[tuple[int, ...], tuple[int, ...]]
+    evidence: Evidence
     num_matches: int
-    conflict: float
 
     def __str__(self) -> str:
         first, second = (_listed(group) for group in self.image_ids)
         return (
-            f"model {self.model_id} taken apart: images {first} and {second} show things that look "
-            f"alike in different surroundings; {self.num_matches} matches refused"
+            f"model {self.model_id} taken apart: images {first} and images {second} are not in one "
+            f"place, {self.evidence.value}; {self.num_matches} matches refused"
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import pycolmap
@@ -170,16 +170,15 @@ class Atlas:
         found = {image_id: registered_photo(model, image_id) for image_id in image_ids}
         return {image_id: posed for image_id, posed in found.items() if posed is not None}
 
-    def replace(self, model: Model, parts: Iterable[Model]) -> None:
-        """Put parts in the place of a model, after matches have left the view graph: the first keeps
-        its id."""
-        first, *others = parts
-        first.model_id = model.model_id
-        for part in others:
+    def replace(self, model: Model, parts: Sequence[Collection[int]]) -> None:
+        """Put models of parts of its photos in the place of a model, once matches have left the
+        view graph; the first part keeps its id."""
+        parted = [model.only(part) for part in parts]
+        for part in parted[1:]:
             part.model_id = self.initializer.next_id()
         # Those over the view graph as it was would still see what has left it.
         kept = [other.only(other.registered) for other in self.models if other is not model]
-        self.models = [first, *others, *kept]
+        self.models = parted + kept
         self.drop_covered()
 
     def grow(self) -> bool:

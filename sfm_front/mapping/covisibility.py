@@ -82,8 +82,8 @@ class Covisibility:
 def halves(num_shared: IndexArray) -> Iterator[BoolArray]:
     """The two parts that each edge of a spanning tree joins: (N,) True for the photos beyond it.
 
-    The tree has the edges of photos that share most, as part of what either observes; ``num_shared``
-    (N, N) is that of ``Covisibility``.
+    The tree joins photos that share most of what either observes. ``num_shared`` (N, N): see
+    ``Covisibility``.
     """
     own = num_shared.diagonal()
     overlap = num_shared / np.maximum(own[:, None] + own[None, :] - num_shared, 1)
@@ -101,3 +101,10 @@ def halves(num_shared: IndexArray) -> Iterator[BoolArray]:
     for photo in reversed(order):
         beyond[nearest[photo]] |= beyond[photo]
         yield beyond[photo]
+
+
+def parts(image_ids: IndexArray, beyond: BoolArray) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Image ids of the photos ``beyond`` (N,) an edge and of the others, the larger part first."""
+    both = [tuple(image_ids[part].tolist()) for part in (beyond, ~beyond)]
+    both.sort(key=len, reverse=True)
+    return both[0], both[1]

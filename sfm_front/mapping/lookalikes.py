@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.geometry.posed_camera import PosedCamera
-from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, halves
+from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, halves, parts
 from sfm_front.types import Float64Array
 
 # Cells along the long side of a photo, and around them one more.
@@ -55,34 +55,20 @@ class FoldOptions:
                 raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
 
 
-@dataclass(frozen=True, slots=True)
-class Fold:
-    """Two parts of a model that cannot both be where they are: image ids, the larger part first.
-
-    ``conflict``: share of what both see in which they see different things.
-    """
-
-    parts: tuple[tuple[int, ...], tuple[int, ...]]
-    conflict: float
-
-
 def find_fold(
     reconstruction: pycolmap.Reconstruction, options: FoldOptions | None = None
-) -> Fold | None:
-    """The two parts of a model that contradict each other most; None if none do."""
-    options = options or FoldOptions()
-    comparison = _Comparison(reconstruction, options)
-    worst, conflict = None, 0.0
+) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """Image ids of the two parts of a model that contradict each other most, the larger first.
+
+    None if none do so enough to tell.
+    """
+    comparison = _Comparison(reconstruction, options or FoldOptions())
+    worst, largest = None, 0.0
     for beyond in halves(comparison.num_shared):
-        found = comparison.conflict(beyond)
-        if found > conflict:
-            worst, conflict = beyond, found
-    if worst is None:
-        return None
-    image_ids = comparison.covisibility.image_ids
-    parts = [tuple(image_ids[part].tolist()) for part in (worst, ~worst)]
-    parts.sort(key=len, reverse=True)
-    return Fold((parts[0], parts[1]), conflict)
+        conflict = comparison.conflict(beyond)
+        if conflict > largest:
+            worst, largest = beyond, conflict
+    return None if worst is None else parts(comparison.covisibility.image_ids, worst)
 
 
 class _Comparison:
@@ -141,11 +127,11 @@ class _Comparison:
         """Median angle between the directions in which two photos see the points they share."""
         key = min(pair), max(pair)
         if key not in self._angles_deg:
-            observed = [self.covisibility.observed[photo] for photo in key]
-            points = self.covisibility.points[np.intersect1d(*observed, assume_unique=True)]
-            rays = [points - self._centers[photo] for photo in key]
-            cosine = np.einsum("nd,nd->n", *rays)
-            cosine /= np.linalg.norm(rays[0], axis=1) * np.linalg.norm(rays[1], axis=1)
+            first, second = (self.covisibility.observed[photo] for photo in key)
+            points = self.covisibility.points[np.intersect1d(first, second, assume_unique=True)]
+            rays1, rays2 = (points - self._centers[photo] for photo in key)
+            cosine = np.einsum("nd,nd->n", rays1, rays2)
+            cosine /= np.linalg.norm(rays1, axis=1) * np.linalg.norm(rays2, axis=1)
             angle = float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
             self._angles_deg[key] = angle
         return self._angles_deg[key]
@@ -192,8 +178,8 @@ class _Comparison:
         ours, theirs, same = (
             _occupied(part) for part in (cells[:start], cells[start:end], cells[end:])
         )
-        different = (ours & _widened(theirs)) | (_widened(ours) & theirs)
-        different &= ~_widened(same)
+        beside = ~_widened(same)
+        different = beside & ((ours & _widened(theirs)) | (_widened(ours) & theirs))
         return int(np.count_nonzero(different)), int(np.count_nonzero(same))
 
 

@@ -1,10 +1,10 @@
-"""Takes apart models that look-alike things have folded."""
+"""Takes apart models in which things that look alike stand in one place."""
 
 from __future__ import annotations
 
-from sfm_front.events import LookAlikesRefused
+from sfm_front.events import Evidence, LookAlikesRefused
 from sfm_front.mapping.atlas import Atlas
-from sfm_front.mapping.audit import agreeing
+from sfm_front.mapping.audit import agreeing, audit
 from sfm_front.mapping.lookalikes import find_fold
 from sfm_front.mapping.model import Model
 
@@ -17,7 +17,7 @@ _MIN_MATCHES = 15
 def unfold(atlas: Atlas) -> bool:
     """Take folded models apart, and grow the parts by the matches that remain; True if any was.
 
-    Matches that put the two parts where they are not are taken out of the view graph. Those that
+    Matches that put two parts where they are not are taken out of the view graph. Those that
     contradict the folded model stay: where there are such, they join the parts the right way.
     """
     unfolded = False
@@ -28,12 +28,15 @@ def unfold(atlas: Atlas) -> bool:
 
 
 def _take_apart(atlas: Atlas, model: Model) -> bool:
-    """Part a model if it is folded."""
-    fold = find_fold(model.reconstruction, atlas.options.fold)
-    if fold is None:
+    """Part a model in two if it is folded."""
+    graph, evidence = atlas.view_graph, Evidence.SURROUNDINGS
+    parts = find_fold(model.reconstruction, atlas.options.fold)
+    if parts is None:
+        audited, evidence = audit(model.reconstruction, graph), Evidence.MATCHES
+        parts = audited.worst_parts if audited.worst_share > 0.5 else None
+    if parts is None:
         return False
-    kept, num_refused = {}, 0
-    larger, graph = set(fold.parts[0]), atlas.view_graph
+    larger, kept, num_refused = set(parts[0]), {}, 0
     crossing = [pair for pair in graph.pairs(model.registered) if len(larger & set(pair)) == 1]
     for pair, matches, agrees in agreeing(model.reconstruction, graph, crossing):
         if agrees.any():
@@ -43,7 +46,8 @@ def _take_apart(atlas: Atlas, model: Model) -> bool:
             num_refused += len(matches) - len(kept[pair])
     if not kept:
         return False
-    atlas.emit(LookAlikesRefused(model.model_id, fold.parts, num_refused, fold.conflict))
+    atlas.emit(LookAlikesRefused(model.model_id, parts, evidence, num_refused))
     graph.keep_only(kept)
-    atlas.replace(model, [model.only(part) for part in fold.parts])
+    # A smaller part's photos wait, and start a model together with others.
+    atlas.replace(model, [part for part in parts if len(part) >= atlas.options.min_model_size])
     return True
