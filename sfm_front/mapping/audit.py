@@ -22,11 +22,11 @@ from sfm_front.types import Float64Array, Uint32Array
 # Pixels that a match of a pair may be off the epipolar line: twice what verification allows, for
 # the poses have an error too.
 _MAX_ERROR_PX = 8.0
-
-
 # Share of a pair's matches from which it agrees with the model, and up to which it contradicts it.
 _AGREES = 0.5
 _CONTRADICTS = 0.25
+# Share of a model's matches in pairs that contradict it from which a user should look at it.
+_DOUBTFUL = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +44,11 @@ class ModelAudit:
     contradicted_share: float
     worst_parts: tuple[tuple[int, ...], tuple[int, ...]] | None
     worst_share: float
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether so much speaks against the model that somebody should look at it."""
+        return self.contradicted_share >= _DOUBTFUL
 
 
 def audit(reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> ModelAudit:

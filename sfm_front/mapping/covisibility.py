@@ -86,6 +86,8 @@ def halves(num_shared: IndexArray) -> Iterator[BoolArray]:
     ``Covisibility``.
     """
     own = num_shared.diagonal()
+    if len(own) == 0:
+        return
     overlap = num_shared / np.maximum(own[:, None] + own[None, :] - num_shared, 1)
     num_photos = len(own)
     nearest, closest = np.zeros(num_photos, np.int64), overlap[0].copy()

@@ -29,11 +29,11 @@ class _Finishing:
 
     def run(self) -> None:
         self._atlas.refine_until_stable()
-        unfold(self._atlas)
         self._restart_largest()
         self._start_remaining()
+        if unfold(self._atlas):
+            self._start_remaining()
         self._fix_intrinsics()
-        unfold(self._atlas)
         self._drop_small()
         while self._register_structure_less():
             self._atlas.refine_until_stable()

@@ -15,16 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pycolmap
-from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, halves, parts
-from sfm_front.types import Float64Array
-
-# Cells along the long side of a photo, and around them one more.
-_CELLS = 24
-_GRID = (_CELLS + 2, _CELLS + 2)
+from sfm_front.mapping.photo_grid import cells_of, occupied, widened
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,37 +168,11 @@ class _Comparison:
         with shared points. Points count where they would lie, visible or hidden."""
         posed = self._posed[photo]
         pixels = posed.project(self.covisibility.points[np.concatenate([*unique, shared])])
-        cells = _cells(pixels, posed.camera)
+        cells = cells_of(pixels, posed.camera)
         start, end = len(unique[0]), len(unique[0]) + len(unique[1])
         ours, theirs, same = (
-            _occupied(part) for part in (cells[:start], cells[start:end], cells[end:])
+            occupied(part) for part in (cells[:start], cells[start:end], cells[end:])
         )
-        beside = ~_widened(same)
-        different = beside & ((ours & _widened(theirs)) | (_widened(ours) & theirs))
+        either = (ours & widened(theirs)) | (widened(ours) & theirs)
+        different = either & ~widened(same)
         return int(np.count_nonzero(different)), int(np.count_nonzero(same))
-
-
-def _cells(pixels: Float64Array, camera: pycolmap.Camera) -> IndexArray:
-    """(N,) numbers of the cells that pixels (N, 2) lie in; 0 for those outside, or nan."""
-    inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)
-    size = max(camera.width, camera.height) / _CELLS
-    column, row = (np.where(inside[:, None], pixels, 0) / size).astype(np.int64).T + 1
-    return np.where(inside, row * _GRID[1] + column, 0)
-
-
-def _occupied(cells: IndexArray) -> BoolArray:
-    occupied = np.zeros(_GRID, np.bool_)
-    occupied.ravel()[cells] = True
-    occupied[0, 0] = False
-    return occupied
-
-
-def _widened(cells: BoolArray) -> BoolArray:
-    """The cells and all that touch them; the border stays empty."""
-    wide: NDArray[np.bool_] = cells.copy()
-    wide[1:] |= cells[:-1]
-    wide[:-1] |= cells[1:]
-    rows = wide.copy()
-    wide[:, 1:] |= rows[:, :-1]
-    wide[:, :-1] |= rows[:, 1:]
-    return wide
