@@ -17,9 +17,10 @@ _GRID = (CELLS + 2, CELLS + 2)
 
 def cells_of(pixels: Float64Array, camera: pycolmap.Camera) -> IndexArray:
     """(N,) numbers of the cells that pixels (N, 2) lie in; 0 for those outside, or nan."""
-    inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)
+    x, y = pixels.T
+    inside: BoolArray = (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
     size = max(camera.width, camera.height) / CELLS
-    column, row = (np.where(inside[:, None], pixels, 0) / size).astype(np.int64).T + 1
+    column, row = ((np.where(inside, z, 0) / size).astype(np.int64) + 1 for z in (x, y))
     return np.where(inside, row * _GRID[1] + column, 0)
 
 
@@ -33,7 +34,7 @@ def occupied(cells: IndexArray) -> BoolArray:
 
 def widened(cells: BoolArray) -> BoolArray:
     """The cells of a grid and all that touch them."""
-    wide = cells.copy()
+    wide: BoolArray = cells.copy()
     wide[1:] |= cells[:-1]
     wide[:-1] |= cells[1:]
     rows = wide.copy()

@@ -20,7 +20,9 @@ from sfm_front.events import (
     SessionStarted,
 )
 from sfm_front.features.global_descriptors.descriptor import resolve
+from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
+from sfm_front.mapping.unfolding import settle
 from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.report_json import write_report
 from sfm_front.reports.retrieval_log import RetrievalLog
@@ -167,7 +169,7 @@ class Session(Closeable):
             self._idle_since_s = time.monotonic()
         if self._is_settled or seconds < _IDLE_AFTER_S:
             return
-        self._is_settled = self._placing_more(self._parts.atlas.settle)
+        self._is_settled = self._placing_more(lambda: settle(self._parts.atlas))
         # The next photo must not be charged with them.
         self._idle_events += self._announcer.pop_model_events()
         if self._is_settled:
@@ -210,11 +212,16 @@ class Session(Closeable):
         clock = Stopwatch()
         with clock.stage("finish"):
             self._placing_more(lambda: finish(self._parts.atlas))
+            audits = [
+                audit(model.reconstruction, self._parts.view_graph)
+                for model in self._parts.atlas.models
+            ]
         with clock.stage("export"):
             models = self._write_snapshot(final=True)
         summary = self._parts.report.finish(
             models,
             {i: self._parts.atlas.why_not_registered(i) for i in self._parts.atlas.waiting},
+            audits=audits,
             seconds=clock.seconds,
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
