@@ -51,8 +51,16 @@ class ModelAudit:
         return self.contradicted_share >= _DOUBTFUL
 
 
-def audit(reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> ModelAudit:
-    """Compare a model with the verified pairs of its photos."""
+def audit(
+    reconstruction: pycolmap.Reconstruction,
+    view_graph: ViewGraph,
+    *,
+    largest_part: int | None = None,
+) -> ModelAudit:
+    """Compare a model with the verified pairs of its photos.
+
+    ``largest_part``: the smaller of the worst parts is to have no more photos than this.
+    """
     covisibility = Covisibility.of(reconstruction, min_observers=2)
     image_ids = covisibility.image_ids
     pairs = view_graph.pairs(image_ids.tolist())
@@ -66,6 +74,9 @@ def audit(reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> Mod
     ends = np.searchsorted(image_ids, np.array(pairs, np.int64).reshape(-1, 2))
     worst, worst_share = None, 0.0
     for beyond in halves(covisibility.num_shared()):
+        size = np.count_nonzero(beyond)
+        if largest_part is not None and min(size, len(beyond) - size) > largest_part:
+            continue
         crossing = beyond[ends[:, 0]] != beyond[ends[:, 1]]
         share = against[crossing].sum() / max(1, speaking[crossing].sum())
         if share > worst_share:

@@ -40,8 +40,7 @@ def _take_apart(atlas: Atlas, model: Model) -> bool:
     graph, evidence = atlas.view_graph, Evidence.SURROUNDINGS
     parts = find_fold(model.reconstruction, atlas.options.fold)
     if parts is None:
-        audited, evidence = audit(model.reconstruction, graph), Evidence.MATCHES
-        parts = audited.worst_parts if audited.worst_share > 0.5 else None
+        parts, evidence = _misplaced(atlas, model), Evidence.MATCHES
     if parts is None:
         return False
     larger, kept, num_refused = set(parts[0]), {}, 0
@@ -59,3 +58,14 @@ def _take_apart(atlas: Atlas, model: Model) -> bool:
     # A smaller part's photos wait, and start a model together with others.
     atlas.replace(model, [part for part in parts if len(part) >= atlas.options.min_model_size])
     return True
+
+
+def _misplaced(atlas: Atlas, model: Model) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """The others, and photos that most of their matches want elsewhere, too few to have
+    surroundings of their own.
+
+    Of more photos the majority says nothing: where two things look alike, most matches are wrong.
+    """
+    largest_part = atlas.options.fold.min_observers - 1
+    audited = audit(model.reconstruction, atlas.view_graph, largest_part=largest_part)
+    return audited.worst_parts if audited.worst_share > 0.5 else None

@@ -10,10 +10,11 @@ from helpers.photo_stream import SceneFeed, centre_of, position_errors_m
 from sfm_front.evaluation.synthetic.scene import make_scene
 from sfm_front.events import Evidence, LookAlikesRefused
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
+from sfm_front.mapping.audit import agreeing, audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import ModelState
-from sfm_front.mapping.unfolding import unfold
+from sfm_front.mapping.unfolding import settle, unfold
 
 OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
 
@@ -56,6 +57,36 @@ def test_a_folded_model_is_taken_apart_and_joined_by_true_matches():
     atlas = atlas_of(walk, events.append, folded=True)
     finish(atlas)
     assert any(isinstance(event, LookAlikesRefused) for event in events)
+    assert_true(atlas, walk)
+
+
+def test_a_session_that_waits_takes_a_folded_model_apart():
+    walk = LookAlikeWalk()
+    atlas = atlas_of(walk, lambda _: None, folded=True)
+    answers = [settle(atlas)]
+    while not answers[-1]:
+        answers.append(settle(atlas))
+    assert len(answers) > 1
+    assert_true(atlas, walk)
+
+
+def test_most_matches_do_not_outvote_the_surroundings():
+    """The look-alikes match each other in many photos, and few hold the true model together."""
+    walk = LookAlikeWalk()
+    atlas = atlas_of(walk, lambda _: None, folded=False)
+    model, graph = atlas.models[0], atlas.view_graph
+    found = agreeing(model.reconstruction, graph, graph.pairs(model.registered))
+    graph.keep_only(
+        {
+            (late, early): matches[:0]
+            for (late, early), matches, agrees in found
+            if early <= NUM_PHOTOS // 2 < late - 2 and agrees.mean() > 0.5
+        }
+    )
+    atlas.replace(model, [model.registered])
+    audited = audit(model.reconstruction, graph)
+    assert audited.worst_share > 0.5
+    finish(atlas)
     assert_true(atlas, walk)
 
 
