@@ -80,6 +80,34 @@ class ModelRefined:
         )
 
 
+class Evidence(Enum):
+    """What shows that two groups of photos are not where a model has them."""
+
+    SURROUNDINGS = "beside what looks alike they see different things"
+    MATCHES = "most of the matches between them say otherwise"
+
+
+@dataclass(frozen=True, slots=True)
+class LookAlikesRefused:
+    """Two groups of photos show things that look alike, and had been taken for one place.
+
+    The ``num_matches`` that said so are no longer believed. The groups of image ids, the larger
+    first, come together again only by other matches.
+    """
+
+    model_id: int
+    image_ids: tuple[tuple[int, ...], tuple[int, ...]]
+    evidence: Evidence
+    num_matches: int
+
+    def __str__(self) -> str:
+        first, second = (_listed(group) for group in self.image_ids)
+        return (
+            f"model {self.model_id} taken apart: images {first} and images {second} are not in one "
+            f"place, {self.evidence.value}; {self.num_matches} matches refused"
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class ModelsJoined:
     """A model took in another one, which is no model of its own any more, in ``seconds``.
@@ -140,6 +168,7 @@ ModelEvent: TypeAlias = (
     | ModelDropped
     | ModelRefined
     | ModelsJoined
+    | LookAlikesRefused
     | RegisteredStructureLess
     | LookedAgain
 )
@@ -254,3 +283,14 @@ Listener: TypeAlias = Callable[[Event], None]
 
 # Stages of ``PhotoAdded.seconds`` that run ahead of a photo's turn, beside the mapping of others.
 PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})
+
+
+def _listed(image_ids: tuple[int, ...]) -> str:
+    """Consecutive numbers as ranges: 1-7, 9."""
+    runs: list[list[int]] = []
+    for image_id in image_ids:
+        if runs and image_id == runs[-1][-1] + 1:
+            runs[-1][1:] = [image_id]
+        else:
+            runs.append([image_id])
+    return ", ".join("-".join(map(str, run)) for run in runs)

@@ -33,6 +33,14 @@ class PosedCamera:
         directions: Float64Array = rays @ self.cam_from_world.rotation.matrix()
         return directions
 
+    def project(self, points: Float64Array) -> Float64Array:
+        """(N, 2) pixels of points (N, 3) in world coordinates; nan for those behind the camera."""
+        in_camera = points @ self.cam_from_world.rotation.matrix().T
+        in_camera += self.cam_from_world.translation
+        pixels = np.asarray(self.camera.img_from_cam(in_camera), np.float64).reshape(-1, 2)
+        pixels[in_camera[:, 2] <= 0] = np.nan
+        return pixels
+
     def relative(self, other: PosedCamera) -> pycolmap.Rigid3d:
         """Pose of the other photo, as seen from this one: cam2_from_cam1, translation as long as
         the baseline."""

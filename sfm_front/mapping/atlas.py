@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import pycolmap
@@ -20,6 +20,7 @@ from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.joining import Joiner, JoiningOptions
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
+from sfm_front.mapping.lookalikes import FoldOptions
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.mapping.view_graph import ViewGraph
@@ -51,6 +52,7 @@ class AtlasOptions:
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
     joining: JoiningOptions = field(default_factory=JoiningOptions)
+    fold: FoldOptions = field(default_factory=FoldOptions)
 
     def __post_init__(self) -> None:
         for name in ("min_second_model", "min_model_size"):
@@ -186,6 +188,17 @@ class Atlas:
         model = self.models[0].reconstruction
         found = {image_id: registered_photo(model, image_id) for image_id in image_ids}
         return {image_id: posed for image_id, posed in found.items() if posed is not None}
+
+    def replace(self, model: Model, parts: Sequence[Collection[int]]) -> None:
+        """Put models of parts of its photos in the place of a model, once matches have left the
+        view graph; the first part keeps its id."""
+        parted = [model.only(part) for part in parts]
+        for part in parted[1:]:
+            part.model_id = self.initializer.next_id()
+        # Those over the view graph as it was would still see what has left it.
+        kept = [other.only(other.registered) for other in self.models if other is not model]
+        self.models = parted + kept
+        self.drop_covered()
 
     def grow(self) -> bool:
         """Join models that belong together, then grow each, the largest first.

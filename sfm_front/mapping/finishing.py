@@ -10,6 +10,7 @@ from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.initialization import Initializer
 from sfm_front.mapping.model import Model
 from sfm_front.mapping.restart import Restart
+from sfm_front.mapping.unfolding import unfold
 
 
 def finish(atlas: Atlas, restart: Restart | None = None) -> None:
@@ -34,6 +35,8 @@ class _Finishing:
         while self._restart.go_on():
             pass
         self._start_remaining()
+        if unfold(self._atlas):
+            self._start_remaining()
         self._fix_intrinsics()
         self._drop_small()
         while self._register_structure_less():

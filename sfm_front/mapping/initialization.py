@@ -111,6 +111,10 @@ class Initializer:
             model_ids=self._model_ids,
         )
 
+    def next_id(self) -> int:
+        """For a model that is made in another way."""
+        return next(self._model_ids)
+
     def go_on_after(self, model_id: int) -> None:
         """Give the next model an id after this one."""
         self._model_ids = count(model_id + 1)
@@ -176,7 +180,7 @@ class Initializer:
         )
         if not model.initialize(*pair, constraints):
             return None
-        model.model_id = next(self._model_ids)
+        model.model_id = self.next_id()
         self._emit(
             ModelStarted(
                 model.model_id, pair, constraints.min_angle_deg, constraints.min_inliers, kind

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import pycolmap
@@ -230,6 +230,20 @@ class Model:
     @property
     def _is_settled(self) -> bool:
         return self._under_way is None and self._schedule.last[0] == self.num_registered
+
+    def only(self, image_ids: Collection[int]) -> Model:
+        """A model of these of its photos, over the view graph as it is now."""
+        reconstruction = copy.deepcopy(self.reconstruction)
+        for image_id in sorted(self.registered - set(image_ids)):
+            reconstruction.deregister_frame(reconstruction.image(image_id).frame_id)
+        return Model.restored(
+            self._view_graph,
+            self._options,
+            reconstruction,
+            self.state,
+            self.emit,
+            self._adjuster,
+        )
 
     def finish(self) -> None:
         """Refine a last time. The model cannot grow any more after this."""

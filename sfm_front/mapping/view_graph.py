@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 
+import numpy as np
 import pycolmap
 
 from sfm_front.geometry.trivial_rigs import trivial_frame, trivial_rig
@@ -91,8 +92,7 @@ class ViewGraph:
     def matches(self, image_id1: int, image_id2: int) -> Uint32Array:
         """(M, 2) keypoint indices in either photo: the inliers of a verified pair."""
         graph = self._cache.correspondence_graph
-        matches: Uint32Array = graph.extract_matches_between_images(image_id1, image_id2)
-        return matches
+        return np.asarray(graph.extract_matches_between_images(image_id1, image_id2), np.uint32)
 
     def pairs(self, among: Collection[int]) -> list[tuple[int, int]]:
         """Verified pairs of these photos, most inliers first; the later photo stands first."""
@@ -112,6 +112,31 @@ class ViewGraph:
         """
         angle_rad = self._angles_rad[pair]
         return math.degrees(angle_rad) if angle_rad >= 0 else None
+
+    def keep_only(self, kept: Mapping[tuple[int, int], Uint32Array]) -> None:
+        """Leave verified pairs, named as by ``pairs``, only these (M, 2) of their matches; a pair
+        without any is taken out.
+
+        Mappers made before go on as if nothing had been taken: whoever has one must make it anew.
+        """
+        for (first, second), matches in kept.items():
+            self._neighbors[first][second] = self._neighbors[second][first] = len(matches)
+            if len(matches) == 0:
+                del self._neighbors[first][second], self._neighbors[second][first]
+                del self._angles_rad[first, second]
+        # pycolmap cannot take anything out.
+        old, self._cache = self._cache, pycolmap.DatabaseCache()
+        for camera in old.cameras.values():
+            self._cache.add_camera(camera)
+            self._cache.add_rig(old.rig(camera.camera_id))
+        for image_id in self._neighbors:
+            self._cache.add_frame(old.frame(image_id))
+            self._cache.add_image(old.image(image_id))
+        for pair in self._angles_rad:
+            geometry = old.correspondence_graph.extract_two_view_geometry(*pair, True)
+            if pair in kept:
+                geometry.inlier_matches = kept[pair]
+            self._cache.correspondence_graph.add_two_view_geometry(*pair, geometry)
 
     def component(self, start: Iterable[int], *, among: Collection[int] | None = None) -> set[int]:
         """Photos linked to the given ones by chains of verified pairs, these included.

@@ -10,6 +10,7 @@ import pycolmap
 from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
+from sfm_front.geometry.epipolar_error import fits_epipolar
 from sfm_front.geometry.rays import undistorted_rays
 from sfm_front.types import (
     Float64Array,
@@ -161,12 +162,5 @@ class Verifier:
         """(M,) whether each match's Sampson error under x2ᵀ E x1 = 0 is at most max_error_px."""
         rays1 = undistorted_rays(view1.camera, view1.points(matches[:, 0]))
         rays2 = undistorted_rays(view2.camera, view2.points(matches[:, 1]))
-        lines2 = rays1 @ essential.T
-        lines1 = rays2 @ essential
-        algebraic = np.einsum("ij,ij->i", rays2, lines2)
-        gradient = (lines1[:, :2] ** 2).sum(axis=1) + (lines2[:, :2] ** 2).sum(axis=1)
         focal_px = 0.5 * (view1.camera.mean_focal_length() + view2.camera.mean_focal_length())
-        max_error = self.options.max_error_px / focal_px
-        # As a comparison that is False for nan: rays that cannot be undistorted are outliers.
-        inside: NDArray[np.bool_] = algebraic**2 <= max_error**2 * gradient
-        return inside
+        return fits_epipolar(essential, rays1, rays2, self.options.max_error_px / focal_px)

@@ -14,6 +14,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``photo_waiting`` | it fits no model yet, and why |
 | ``model_started``, ``model_refined``, ``model_dropped`` | what became of a model |
 | ``models_joined`` | two became one: by which bridge photos, on how many common points |
+| ``look_alikes_refused`` | two groups of photos that were taken for one place |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
 | ``looked_again`` | a poorly connected photo was matched with more: ``found`` overlap |
 | ``session_ended`` | ``finished``: whether all models are written |
@@ -35,6 +36,7 @@ from typing import IO, Any
 from sfm_front.errors import StorageError
 from sfm_front.events import (
     Event,
+    LookAlikesRefused,
     LookedAgain,
     ModelDropped,
     ModelRefined,
@@ -67,6 +69,7 @@ _NAMES: dict[type, str] = {
     ModelRefined: "model_refined",
     ModelDropped: "model_dropped",
     ModelsJoined: "models_joined",
+    LookAlikesRefused: "look_alikes_refused",
     RegisteredStructureLess: "registered_structure_less",
     LookedAgain: "looked_again",
     SessionEnded: "session_ended",

@@ -8,6 +8,7 @@ from typing import Any
 
 from sfm_front.errors import InputError
 from sfm_front.reports.run_summary import (
+    AuditOutcome,
     Latency,
     ModelOutcome,
     Outcome,
@@ -37,6 +38,7 @@ def write_report(output: Path, summary: RunSummary) -> None:
                 "points3D": model.num_points,
                 "mean_reprojection_error_px": round(model.mean_reprojection_error_px, 4),
                 "mean_track_length": round(model.mean_track_length, 3),
+                "audit": _audit_row(model.audit),
             }
             for model in summary.models
         ],
@@ -107,6 +109,19 @@ def _latency_row(latency: Latency | None) -> dict[str, float] | None:
     return _rounded({"median": latency.median_s, "p95": latency.p95_s, "worst": latency.worst_s})
 
 
+def _audit_row(audit: AuditOutcome | None) -> dict[str, Any] | None:
+    if audit is None:
+        return None
+    return {
+        "pairs": audit.num_pairs,
+        "contradicted": audit.num_contradicted,
+        "contradicted_share": round(audit.contradicted_share, 4),
+        "doubtful": audit.is_doubtful,
+        "worst_groups": audit.worst_groups,
+        "worst_share": round(audit.worst_share, 4),
+    }
+
+
 def _rounded(seconds: dict[str, float]) -> dict[str, float]:
     return {stage: round(value, 4) for stage, value in seconds.items()}
 
@@ -122,6 +137,7 @@ def _summary(content: dict[str, Any]) -> RunSummary:
                 model["points3D"],
                 model["mean_reprojection_error_px"],
                 model["mean_track_length"],
+                _audit(model.get("audit")),  # absent in reports of earlier versions
             )
             for model in content["models"]
         ),
@@ -146,6 +162,19 @@ def _summary(content: dict[str, Any]) -> RunSummary:
 
 def _latency(row: dict[str, float] | None) -> Latency | None:
     return None if row is None else Latency(row["median"], row["p95"], row["worst"])
+
+
+def _audit(row: dict[str, Any] | None) -> AuditOutcome | None:
+    if row is None:
+        return None
+    return AuditOutcome(
+        row["pairs"],
+        row["contradicted"],
+        row["contradicted_share"],
+        row["doubtful"],
+        tuple(map(tuple, row["worst_groups"])),
+        row["worst_share"],
+    )
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:

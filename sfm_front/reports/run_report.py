@@ -9,8 +9,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
+import pycolmap
+
 from sfm_front.events import PREFETCHED_STAGES, ModelEvent, ModelRefined, PhotoAdded
+from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.run_summary import (
+    AuditOutcome,
     Latency,
     ModelOutcome,
     Outcome,
@@ -57,15 +61,16 @@ class RunReport:
         why_not: Mapping[int, str],
         hints: Mapping[int, str],
         *,
+        audits: Sequence[ModelAudit],
         seconds: Mapping[str, float],
         events: Sequence[ModelEvent],
         latencies_s: Sequence[float],
     ) -> RunSummary:
         """Sum up.
 
-        ``why_not``: image id → why it is in no model, ``hints``: what would help. ``seconds`` by
-        stage and ``events`` of the end and of idle times. ``latencies_s``: from arrival to pose, of
-        each photo of this run that was placed.
+        ``why_not``: image id → why it is in no model, ``hints``: what would help. ``audits``: one
+        for each model. ``seconds`` by stage and ``events`` of the end and of idle times.
+        ``latencies_s``: from arrival to pose, of each photo of this run that was placed.
         """
         model_of = {
             image_id: number
@@ -81,8 +86,9 @@ class RunReport:
                     model.num_points,
                     model.mean_reprojection_error_px,
                     model.mean_track_length,
+                    _audit_outcome(audit, model.reconstruction),
                 )
-                for model in models
+                for model, audit in zip(models, audits, strict=True)
             ),
             end_seconds=dict(seconds),
             end_events=_in_words(events),
@@ -116,6 +122,20 @@ class RunReport:
             peak_memory_bytes=_peak_memory_bytes(),
             latency=Latency.of(latencies_s),
         )
+
+
+def _audit_outcome(audit: ModelAudit, reconstruction: pycolmap.Reconstruction) -> AuditOutcome:
+    return AuditOutcome(
+        num_pairs=audit.num_pairs,
+        num_contradicted=audit.num_contradicted,
+        contradicted_share=audit.contradicted_share,
+        is_doubtful=audit.is_doubtful,
+        worst_groups=tuple(
+            tuple(sorted(reconstruction.image(image_id).name for image_id in part))
+            for part in audit.worst_parts or ()
+        ),
+        worst_share=audit.worst_share,
+    )
 
 
 def _outcome(

@@ -36,14 +36,33 @@ class PhotoOutcome:
 
 
 @dataclass(frozen=True, slots=True)
+class AuditOutcome:
+    """``num_contradicted`` of ``num_pairs`` verified pairs contradict a model's poses, with
+    ``contradicted_share`` of all matches; ``is_doubtful`` if that is more than sound models have.
+
+    ``worst_groups``: names of the photos of two parts of the model, the larger first, of whose
+    matches the largest share, ``worst_share``, contradicts it; empty if no pair does.
+    """
+
+    num_pairs: int
+    num_contradicted: int
+    contradicted_share: float
+    is_doubtful: bool
+    worst_groups: tuple[tuple[str, ...], ...]
+    worst_share: float
+
+
+@dataclass(frozen=True, slots=True)
 class ModelOutcome:
-    """A finished model; ``path`` is relative to the output."""
+    """A finished model; ``path`` is relative to the output. ``audit``: how far the verified pairs
+    of its photos agree with it; None in reports of earlier versions."""
 
     path: str
     num_registered: int
     num_points: int
     mean_reprojection_error_px: float
     mean_track_length: float
+    audit: AuditOutcome | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from sfm_front.reports.run_summary import RunSummary
+from sfm_front.reports.run_summary import AuditOutcome, RunSummary
+
+# Photos of a doubtful group; report.json names all.
+_MOST_NAMED = 5
 
 
 def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False) -> str:
@@ -23,6 +26,8 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
             f"  {output / model.path}: {model.num_registered} photos, "
             f"{model.num_points} points, {model.mean_reprojection_error_px:.2f} px"
         )
+        if model.audit and model.audit.is_doubtful:
+            lines.append(f"    {_doubt(model.audit)}")
     photos = max(totals.num_photos, 1)
     stages = ", ".join(
         f"{stage} {seconds / photos:.3f}" for stage, seconds in totals.seconds_by_stage.items()
@@ -52,6 +57,16 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
     if not summary.models:
         lines.append(_advice(summary))
     return "\n".join(lines)
+
+
+def _doubt(audit: AuditOutcome) -> str:
+    """What speaks against a model; the photos named are those of the smaller group."""
+    names = audit.worst_groups[-1]
+    named = ", ".join(names[:_MOST_NAMED]) + (", ..." if len(names) > _MOST_NAMED else "")
+    return (
+        f"doubtful: {audit.num_contradicted} of its {audit.num_pairs} pairs, with "
+        f"{audit.contradicted_share:.1%} of the matches, contradict it; look first at {named}"
+    )
 
 
 def _advice(summary: RunSummary) -> str:

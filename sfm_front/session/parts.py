@@ -128,6 +128,7 @@ def restore(parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer
         parts.report.restore(photo)
         pairs = database.pairs(image_id)
         parts.view_graph.add(image_id, photo.name, camera, keypoints, pairs)
+        parts.second_look.note(image_id, (pair.image_id2 for pair in pairs))
         if snapshot is not None and image_id == num_mapped:
             atlas.restore(snapshot.models)
         elif image_id > num_mapped:

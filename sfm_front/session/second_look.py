@@ -80,17 +80,18 @@ class SecondLook:
         self._database = database
         self._atlas = atlas
         self._emit = emit
-        # Image id → those it was matched with on all features, and does not overlap with.
-        self._apart: defaultdict[int, set[int]] = defaultdict(set)
+        # Image id → those it was matched with on all features. A pair that overlaps and was refused
+        # later, for it rests on look-alikes, is not to come back.
+        self._known: defaultdict[int, set[int]] = defaultdict(set)
         self._num_matched = 0
         # Image id → photos and candidates at the last look at it: with more, it may find more.
         self._looked_in: dict[int, tuple[int, int]] = {}
 
-    def note(self, image_id: int, rejected: Iterable[int]) -> None:
-        """These earlier photos were matched with this one on all features, and do not overlap."""
-        for other in rejected:
-            self._apart[image_id].add(other)
-            self._apart[other].add(image_id)
+    def note(self, image_id: int, others: Iterable[int]) -> None:
+        """These earlier photos were matched with this one on all features."""
+        for other in others:
+            self._known[image_id].add(other)
+            self._known[other].add(image_id)
 
     def after_photo(self, image_id: int) -> None:
         """A photo has been added: look again at an earlier one that still waits, with few pairs."""
@@ -136,12 +137,11 @@ class SecondLook:
 
     def _chosen(self, image_id: int, num_candidates: int) -> list[Pair]:
         """The photo with the nearest of those that it may overlap with."""
-        known = self._atlas.view_graph.neighbors(image_id)
         nearest = self._retriever.nearest(
             image_id,
             num_candidates,
-            without=known.keys() | self._apart[image_id] | self._companions(image_id),
-            expand_with=known,
+            without=self._known[image_id] | self._companions(image_id),
+            expand_with=self._atlas.view_graph.neighbors(image_id),
         )
         pairs = [(max(image_id, other), min(image_id, other)) for other in nearest]
         return pairs[: max(0, self.budget)]
@@ -187,10 +187,8 @@ class SecondLook:
             verdicts = self._workers.map(
                 partial(self._verify, later), zip(others, matches, strict=True)
             )
-            found = [pair for pair in verdicts if isinstance(pair, PairGeometry)]
-            overlapping = {pair.image_id2 for pair in found}
-            self.note(later_id, {other.image_id for other in others} - overlapping)
-            verified += found
+            verified += [pair for pair in verdicts if isinstance(pair, PairGeometry)]
+            self.note(later_id, (other.image_id for other in others))
         return verified
 
     def _verify(self, later: View, found: tuple[View, Uint32Array]) -> PairGeometry | Rejected:

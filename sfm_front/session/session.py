@@ -20,7 +20,9 @@ from sfm_front.events import (
     SessionStarted,
 )
 from sfm_front.features.global_descriptors.descriptor import resolve
+from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
+from sfm_front.mapping.unfolding import settle
 from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.report_json import write_report
 from sfm_front.reports.retrieval_log import RetrievalLog
@@ -182,7 +184,7 @@ class Session(Closeable):
         """Do what is next; True if nothing is left to be done."""
         parts = self._parts
         return (
-            parts.atlas.settle()
+            settle(parts.atlas)
             and not parts.second_look.while_idle()
             and not parts.restart.go_on(_PHOTOS_AT_A_TIME)
         )
@@ -226,6 +228,10 @@ class Session(Closeable):
             self._placing_more(self._parts.second_look.at_end)
         with clock.stage("finish"):
             self._placing_more(lambda: finish(self._parts.atlas, self._parts.restart))
+            audits = [
+                audit(model.reconstruction, self._parts.view_graph)
+                for model in self._parts.atlas.models
+            ]
         with clock.stage("export"):
             models = self._write_snapshot(final=True)
         waiting = self._parts.atlas.waiting
@@ -233,6 +239,7 @@ class Session(Closeable):
             models,
             {image_id: self._parts.atlas.why_not_registered(image_id) for image_id in waiting},
             {image_id: self._hint(image_id) for image_id in waiting},
+            audits=audits,
             seconds=clock.seconds,
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
@@ -324,8 +331,9 @@ class Session(Closeable):
         )
         self._is_settled = False
         self._tell(added, registered)
-        tried = (i for i, why in rejected.items() if why.reason is not Rejection.UNLIKELY)
-        parts.second_look.note(image_id, tried)
+        dismissed = {i for i, why in rejected.items() if why.reason is Rejection.UNLIKELY}
+        parts.second_look.note(image_id, rejected.keys() - dismissed)
+        parts.second_look.note(image_id, (pair.image_id2 for pair in pairs))
         self._placing_more(lambda: parts.second_look.after_photo(image_id))
         return added
 

@@ -120,3 +120,20 @@ def test_pairs_may_come_after_their_photos(orbit):
     late.scene.add_pairs([pair])
     assert late.scene.pairs({1, 2}) == [(2, 1)]
     assert late.scene.neighbors(1) == {2: pair.num_inliers}
+
+
+def test_pairs_keep_only_the_matches_they_are_left(feed):
+    graph = feed.scene
+    before = {pair: graph.matches(*pair) for pair in graph.pairs(graph.image_ids)}
+    graph.keep_only({(2, 1): before[2, 1][::2], (3, 2): before[3, 2][:0]})
+    assert graph.image_ids == [1, 2, 3, 4, 5]
+    assert sorted(graph.pairs(graph.image_ids)) == sorted(before.keys() - {(3, 2)})
+    assert graph.neighbors(1)[2] == graph.neighbors(2)[1] == len(before[2, 1][::2])
+    assert 3 not in graph.neighbors(2)
+    np.testing.assert_array_equal(graph.matches(2, 1), before[2, 1][::2])
+    np.testing.assert_array_equal(graph.matches(4, 3), before[4, 3])
+    # Photos that come later, and new mappers, see what is left.
+    feed.add(4)
+    _, reconstruction = graph.new_mapper()
+    assert sorted(reconstruction.images) == [1, 2, 3, 4, 5, 6]
+    assert graph.angle_deg((2, 1)) is not None

@@ -10,6 +10,7 @@ from helpers.model_building import looking, make_model
 
 from sfm_front.errors import InputError
 from sfm_front.events import ModelRefined, ModelStarted, PhotoAdded, StartKind
+from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.report_json import read_report, write_report
 from sfm_front.reports.run_report import RunReport
 from sfm_front.reports.run_summary import Latency, RunSummary
@@ -82,6 +83,10 @@ def run(tmp_path) -> RunSummary:
         models,
         why_not,
         {3: "take one between them"},
+        audits=[
+            ModelAudit(8, 2, 0.0625, ((1,), (2,)), 0.5),
+            ModelAudit(0, 0, 0.0, None, 0.0),
+        ],
         seconds={"export": 0.75},
         events=[REFINED, STARTED],
         latencies_s=[2.0, 0.12345678],
@@ -128,6 +133,14 @@ def test_models_and_the_end(content):
             "points3D": 300,
             "mean_reprojection_error_px": 0.5,
             "mean_track_length": 3.25,
+            "audit": {
+                "pairs": 8,
+                "contradicted": 2,
+                "contradicted_share": 0.0625,
+                "doubtful": True,
+                "worst_groups": [["ä 1.jpg"], ["b.jpg"]],
+                "worst_share": 0.5,
+            },
         },
         {
             "path": "sparse/1",
@@ -135,6 +148,14 @@ def test_models_and_the_end(content):
             "points3D": 100,
             "mean_reprojection_error_px": 1.5,
             "mean_track_length": 3.25,
+            "audit": {
+                "pairs": 0,
+                "contradicted": 0,
+                "contradicted_share": 0,
+                "doubtful": False,
+                "worst_groups": [],
+                "worst_share": 0,
+            },
         },
     ]
     assert content["end"] == {"seconds": {"export": 0.75}, "events": [str(STARTED)]}
@@ -170,6 +191,13 @@ def test_what_is_read_back_is_what_was_written(run, tmp_path):
     assert read.skipped == [BROKEN]
 
 
+def test_a_report_of_an_earlier_version_has_no_audits(content, tmp_path):
+    for model in content["models"]:
+        del model["audit"]
+    (tmp_path / "report.json").write_text(json.dumps(content), encoding="utf-8")
+    assert [model.audit for model in read_report(tmp_path).models] == [None, None]
+
+
 @pytest.mark.parametrize("text", [None, "", "[]", '{"photos": 3}', '{"photos": [{}]}'])
 def test_an_unreadable_report_is_refused_in_one_line(tmp_path, text):
     if text is not None:
@@ -184,14 +212,14 @@ def test_work_by_quarter_is_what_a_photo_waits_for_in_its_turn():
     for number in range(1, 9):
         seconds = {"match": float(number), "refine": 100.0, "sift": 10.0, "read": 1.0}
         report.add(PhotoAdded(f"{number}.jpg", image_id=number, seconds=seconds))
-    run = report.finish([], {}, {}, seconds={}, events=(), latencies_s=())
+    run = report.finish([], {}, {}, audits=[], seconds={}, events=(), latencies_s=())
     assert run.totals.median_seconds_by_quarter == (1.5, 3.5, 5.5, 7.5)
 
 
 def test_without_models_there_is_still_a_report():
     report = RunReport()
     report.add(BROKEN)
-    run = report.finish([], {}, {}, seconds={}, events=[], latencies_s=[])
+    run = report.finish([], {}, {}, audits=[], seconds={}, events=[], latencies_s=[])
     assert run.models == ()
     assert run.totals.num_registered == 0
     assert run.totals.mean_reprojection_error_px is None
@@ -204,12 +232,12 @@ def test_a_photo_that_was_skipped_and_comes_again_counts_once():
     copy = Skipped("a.jpg", SkipReason.DUPLICATE, "same file as a.jpg")
     for photo in (Skipped("a.jpg", SkipReason.TRUNCATED), BROKEN, BROKEN, whole):
         report.add(photo)
-    run = report.finish([], {}, {}, seconds={}, events=[], latencies_s=[])
+    run = report.finish([], {}, {}, audits=[], seconds={}, events=[], latencies_s=[])
     assert [photo.name for photo in run.photos] == ["broken.jpg", "a.jpg"]
     assert run.skipped == [BROKEN]
     # A copy under the same name does not take the place of the photo itself.
     report.add(copy)
-    run = report.finish([], {}, {}, seconds={}, events=[], latencies_s=[])
+    run = report.finish([], {}, {}, audits=[], seconds={}, events=[], latencies_s=[])
     assert run.skipped == [BROKEN, copy]
     assert len(run.used) == 1
 

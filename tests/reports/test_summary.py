@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sfm_front.reports.run_summary import (
+    AuditOutcome,
     Latency,
     ModelOutcome,
     Outcome,
@@ -21,6 +22,8 @@ from sfm_front.types import Skipped, SkipReason
 
 PLACED = PhotoOutcome("a.jpg", 1, 0, None, 90, None, 0, 0, (), {}, ())
 
+SOUND = AuditOutcome(8, 0, 0.0, False, (), 0.0)
+
 
 def waiting(name: str, why: str) -> PhotoOutcome:
     return replace(PLACED, name=name, model=None, why_not=why)
@@ -29,7 +32,9 @@ def waiting(name: str, why: str) -> PhotoOutcome:
 def summary(photos: Sequence[Outcome], num_models: int = 1) -> RunSummary:
     used = [photo for photo in photos if isinstance(photo, PhotoOutcome)]
     registered = sum(photo.model is not None for photo in used)
-    models = [ModelOutcome(f"sparse/{n}", registered, 1234, 0.4321, 3.5) for n in range(num_models)]
+    models = [
+        ModelOutcome(f"sparse/{n}", registered, 1234, 0.4321, 3.5, SOUND) for n in range(num_models)
+    ]
     return RunSummary(
         photos=tuple(photos),
         models=tuple(models),
@@ -125,3 +130,15 @@ def test_where_photos_overlap_but_give_no_model_the_camera_did_not_move(num_veri
     photos = [replace(waiting(f"{i}.jpg", "…"), num_verified=n) for i, n in enumerate(num_verified)]
     text = closing_summary(summary(photos, 0), Path("out"))
     assert advice in text.splitlines()[-1]
+
+
+def test_a_doubtful_model_is_told_with_the_photos_to_look_at():
+    others = tuple(f"{n}.jpg" for n in range(10, 20))
+    doubtful = AuditOutcome(80, 9, 0.125, True, (others, tuple(f"{n}.jpg" for n in range(6))), 0.6)
+    told = summary([PLACED])
+    told = replace(told, models=(replace(told.models[0], audit=doubtful),))
+    line = closing_summary(told, Path("out")).splitlines()[2].strip()
+    assert line == (
+        "doubtful: 9 of its 80 pairs, with 12.5% of the matches, contradict it; "
+        "look first at 0.jpg, 1.jpg, 2.jpg, 3.jpg, 4.jpg, ..."
+    )

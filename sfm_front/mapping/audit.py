@@ -1,0 +1,121 @@
+"""How far the verified pairs of a model agree with its poses.
+
+A pair's own relative pose would be no judge: without a known focal length it is off by tens of
+degrees on sound models. Its matches are, whatever the focal length was thought to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pycolmap
+
+from sfm_front.geometry.epipolar_error import fits_epipolar
+from sfm_front.geometry.posed_camera import PosedCamera
+from sfm_front.geometry.rays import undistorted_rays
+from sfm_front.mapping.covisibility import BoolArray, Covisibility, halves, parts
+from sfm_front.mapping.view_graph import ViewGraph
+from sfm_front.types import Float64Array, Uint32Array
+
+# Pixels that a match of a pair may be off the epipolar line: twice what verification allows, for
+# the poses have an error too.
+_MAX_ERROR_PX = 8.0
+# Share of a pair's matches from which it agrees with the model, and up to which it contradicts it.
+_AGREES = 0.5
+_CONTRADICTS = 0.25
+# Share of a model's matches in pairs that contradict it from which a user should look at it.
+_DOUBTFUL = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class ModelAudit:
+    """What the verified pairs of a model say of it.
+
+    ``num_contradicted`` of the ``num_pairs`` contradict its poses, with a share of
+    ``contradicted_share`` of all matches. ``worst_parts``: image ids of the two parts of the model,
+    the larger first, of whose matches the pairs that contradict it have the largest share,
+    ``worst_share``; None if no pair does.
+    """
+
+    num_pairs: int
+    num_contradicted: int
+    contradicted_share: float
+    worst_parts: tuple[tuple[int, ...], tuple[int, ...]] | None
+    worst_share: float
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether so much speaks against the model that somebody should look at it."""
+        return self.contradicted_share >= _DOUBTFUL
+
+
+def audit(
+    reconstruction: pycolmap.Reconstruction,
+    view_graph: ViewGraph,
+    *,
+    largest_part: int | None = None,
+) -> ModelAudit:
+    """Compare a model with the verified pairs of its photos.
+
+    ``largest_part``: the smaller of the worst parts is to have no more photos than this.
+    """
+    covisibility = Covisibility.of(reconstruction, min_observers=2)
+    image_ids = covisibility.image_ids
+    pairs = view_graph.pairs(image_ids.tolist())
+    found = [
+        (len(matches), agrees.mean())
+        for _, matches, agrees in agreeing(reconstruction, view_graph, pairs)
+    ]
+    num_matches, shares = np.array(found, np.float64).reshape(-1, 2).T
+    against = np.where(shares <= _CONTRADICTS, num_matches, 0)
+    speaking = against + np.where(shares >= _AGREES, num_matches, 0)
+    ends = np.searchsorted(image_ids, np.array(pairs, np.int64).reshape(-1, 2))
+    worst, worst_share = None, 0.0
+    for beyond in halves(covisibility.num_shared()):
+        size = np.count_nonzero(beyond)
+        if largest_part is not None and min(size, len(beyond) - size) > largest_part:
+            continue
+        crossing = beyond[ends[:, 0]] != beyond[ends[:, 1]]
+        share = against[crossing].sum() / max(1, speaking[crossing].sum())
+        if share > worst_share:
+            worst, worst_share = beyond, float(share)
+    return ModelAudit(
+        num_pairs=len(pairs),
+        num_contradicted=int(np.count_nonzero(against)),
+        contradicted_share=float(against.sum() / max(1, num_matches.sum())),
+        worst_parts=None if worst is None else parts(image_ids, worst),
+        worst_share=worst_share,
+    )
+
+
+def agreeing(
+    reconstruction: pycolmap.Reconstruction,
+    view_graph: ViewGraph,
+    pairs: Iterable[tuple[int, int]],
+) -> Iterator[tuple[tuple[int, int], Uint32Array, BoolArray]]:
+    """Verified pairs of registered photos, their matches (M, 2), and which of these (M,) lie where
+    the poses of the model put them."""
+    rays: dict[int, Float64Array] = {}
+    for pair in pairs:
+        posed = []
+        for image_id in pair:
+            image = reconstruction.image(image_id)
+            camera = reconstruction.camera(image.camera_id)
+            posed.append(PosedCamera(camera, image.cam_from_world()))
+            if image_id not in rays:
+                pixels = np.array([point.xy for point in image.points2D], np.float64)
+                rays[image_id] = undistorted_rays(camera, pixels)
+        focal_px = 0.5 * sum(one.camera.mean_focal_length() for one in posed)
+        matches = view_graph.matches(*pair)
+        yield (
+            pair,
+            matches,
+            fits_epipolar(
+                pycolmap.essential_matrix_from_pose(posed[0].relative(posed[1])),
+                rays[pair[0]][matches[:, 0]],
+                rays[pair[1]][matches[:, 1]],
+                _MAX_ERROR_PX / focal_px,
+            ),
+        )
