@@ -20,6 +20,7 @@ from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.joining import Joiner, JoiningOptions
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
+from sfm_front.mapping.loop_closing import LoopCloser, LoopOptions
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.mapping.view_graph import ViewGraph
@@ -47,6 +48,7 @@ class AtlasOptions:
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
     joining: JoiningOptions = field(default_factory=JoiningOptions)
+    loops: LoopOptions = field(default_factory=LoopOptions)
 
     def __post_init__(self) -> None:
         for name in ("min_second_model", "min_model_size"):
@@ -90,6 +92,9 @@ class Atlas:
             adjuster=adjuster,
         )
         self._joiner = Joiner(view_graph, self.options.joining, self.options.mapper, self.emit)
+        self._loops = LoopCloser(
+            view_graph, self.options.loops, self.emit, seed=self.options.mapper.seed
+        )
         self.models: list[Model] = []
 
     def restore(self, models: Iterable[tuple[pycolmap.Reconstruction, ModelState]]) -> None:
@@ -173,17 +178,23 @@ class Atlas:
         return {image_id: posed for image_id, posed in found.items() if posed is not None}
 
     def grow(self) -> bool:
-        """Join models that belong together, then grow each, the largest first.
+        """Join models that belong together, then grow each, the largest first, and close loops.
 
         True if any grew.
         """
         num_models = len(self.models)
         self.models = self._joiner.join(self.models)
         grew = len(self.models) < num_models
-        for model in list(self.models):
-            grew |= bool(model.grow(self.candidates_of(model)))
+        for number, model in enumerate(self.models):
+            placed = model.grow(self.candidates_of(model))
+            self.models[number] = self._loops.close(model, placed)
+            grew |= bool(placed)
         self.drop_covered()
         return grew
+
+    def close_loops(self) -> None:
+        """Close all loops of all models, whichever photos complete them."""
+        self.models = [self._loops.close(m, sorted(m.registered)) for m in self.models]
 
     def settle(self) -> bool:
         """Refine all models, and register what fits them then.

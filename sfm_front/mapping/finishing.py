@@ -27,6 +27,7 @@ class _Finishing:
         self._initializer = atlas.initializer
 
     def run(self) -> None:
+        self._atlas.close_loops()
         self._atlas.refine_until_stable()
         self._restart_largest()
         self._start_remaining()
@@ -55,6 +56,7 @@ class _Finishing:
             best = self._atlas.models[0].num_registered if self._atlas.models else 0
             if fresh.num_registered > best:
                 self._atlas.models.insert(0, fresh)
+                self._atlas.close_loops()
                 self._atlas.refine_until_stable()
                 continue
             self._atlas.announce_drop(fresh, DropReason.NO_BETTER)
