@@ -8,7 +8,6 @@ the scenes done so far.
 from __future__ import annotations
 
 import argparse
-import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -21,12 +20,17 @@ from sfm_front.cli.progress import CountLine
 from sfm_front.errors import ConfigError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene
-from sfm_front.evaluation.tuning.arrangements import ARRANGEMENTS, arrange, check_arrangements
+from sfm_front.evaluation.tuning.arrangements import ARRANGEMENTS, check_arrangements
 from sfm_front.evaluation.tuning.constants import CONSTANTS, Sweep, make_sweep
+from sfm_front.evaluation.tuning.scene_arguments import (
+    add_scene_arguments,
+    chosen_options,
+    chosen_scenes,
+    chosen_settings,
+)
 from sfm_front.evaluation.tuning.table import format_sweep
-from sfm_front.evaluation.tuning.trials import Trials, describe, find_scenes, try_scene
+from sfm_front.evaluation.tuning.trials import Trials, counter, describe, num_photos, try_scene
 from sfm_front.reports.summary import clock
-from sfm_front.session.options import SessionOptions
 from sfm_front.storage.json_files import write_json
 
 
@@ -47,48 +51,30 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         help="one of those below, or the dotted path of any other option with --values",
     )
     parser.add_argument("--values", metavar="V,V,...", help="of one NAME, instead of its own")
-    parser.add_argument(
-        "--data", type=Path, required=True, metavar="FOLDER", help="holds a folder per scene"
-    )
-    parser.add_argument("--scenes", metavar="NAMES", help="separated by commas (default: all)")
+    add_scene_arguments(parser)
     parser.add_argument(
         "--arrangements",
         default=",".join(ARRANGEMENTS),
         metavar="NAMES",
         help="separated by commas (default: %(default)s)",
     )
-    parser.add_argument(
-        "--threads", type=int, default=1, metavar="N", help="1, the default, repeats to the bit"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="of all RANSAC")
-    parser.add_argument(
-        "--cache",
-        type=Path,
-        default=Path("outputs/tuning_cache"),
-        metavar="DIR",
-        help="keeps what photos were described by (default: %(default)s)",
-    )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
     return parser.parse_args(argv)
 
 
 def run(args: argparse.Namespace) -> None:
-    base = SessionOptions(global_descriptor="vlad", threads=args.threads, seed=args.seed)
+    base = chosen_options(args)
     values = args.values.split(",") if args.values else None
     if values is not None and len(args.names) > 1:
         raise ConfigError("--values goes with one NAME")
     sweeps = [make_sweep(name, values, base) for name in args.names]
     arrangements = args.arrangements.split(",")
     check_arrangements(arrangements)
-    scenes = find_scenes(args.data, args.scenes.split(",") if args.scenes else None)
+    scenes = chosen_scenes(args)
     # Sweeps share the session with the current value of all of them.
     options = list(dict.fromkeys(tried for sweep in sweeps for tried in sweep.options.values()))
     progress = CountLine("photo", sys.stderr)
     total = sum(num_photos(scene, arrangements, len(options)) for scene in scenes)
-    counter = itertools.count(1)
-
-    def count() -> None:
-        progress.show(next(counter), total)
+    count = counter(progress.show, total)
 
     import pycolmap
 
@@ -114,20 +100,9 @@ def run(args: argparse.Namespace) -> None:
         print("\n" + format_sweep(sweep, trials))
 
 
-def num_photos(scene: BenchmarkScene, arrangements: Sequence[str], num_options: int) -> int:
-    """How many photos are described or taken in."""
-    arriving = sum(len(arrange(range(scene.num_photos), name)) for name in arrangements)
-    return scene.num_photos + num_options * arriving
-
-
 def as_dict(args: argparse.Namespace, sweeps: Sequence[Sweep], trials: Trials) -> dict[str, object]:
     return {
-        "settings": {
-            "threads": args.threads,
-            "seed": args.seed,
-            "global_descriptor": "vlad",
-            "data": args.data,
-        },
+        "settings": chosen_settings(args),
         "machine": machine(),
         "options": [
             {

@@ -138,8 +138,34 @@ class RegisteredStructureLess:
         return f"{len(self.image_ids)} photos registered without structure in model {self.model_id}"
 
 
+@dataclass(frozen=True, slots=True)
+class LookedAgain:
+    """A poorly connected photo was matched with more others, on all features.
+
+    ``found``: those of the ``num_tried`` that overlap with it. ``num_left``: pairs that may still
+    be tried, for all photos.
+    """
+
+    image_id: int
+    found: tuple[int, ...]
+    num_tried: int
+    num_left: int
+
+    def __str__(self) -> str:
+        return (
+            f"looked again at image {self.image_id}: {len(self.found)} of {self.num_tried} "
+            f"further photos overlap; {self.num_left} more pairs may be tried"
+        )
+
+
 ModelEvent: TypeAlias = (
-    ModelStarted | ModelDropped | ModelRefined | ModelsJoined | LoopClosed | RegisteredStructureLess
+    ModelStarted
+    | ModelDropped
+    | ModelRefined
+    | ModelsJoined
+    | LoopClosed
+    | RegisteredStructureLess
+    | LookedAgain
 )
 
 

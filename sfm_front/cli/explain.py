@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(explanation)
     if arguments.draw is not None:
         verified = [c.name for c in explanation.candidates if c.num_verified is not None]
-        others = [*verified, *(c.name for c in explanation.candidates), *explanation.later]
+        others = [*verified, *(c.name for c in explanation.candidates), *explanation.others]
         against = arguments.against or next(iter(others), None)
         if against is None:
             raise InputError(f"{arguments.photo}: nothing to draw, it has no candidates")

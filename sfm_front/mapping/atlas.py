@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import pycolmap
@@ -37,6 +37,8 @@ class AtlasOptions:
     min_model_size: int = 3
     # Share of linked photos that may be in no model without a restart.
     max_missed_share: float = 0.02
+    # Pairs with photos of the model by which a photo must be linked for that, in large models.
+    min_links: int = 3
     # Share of the photos linked to a model that it should register itself.
     min_share: float = 0.75
     # Restarts per constraint level that the end of a session may try.
@@ -44,6 +46,8 @@ class AtlasOptions:
     # Restarts that may register over half as many photos as the best model, but no more than it,
     # before giving up.
     max_failures: int = 1
+    # Both may be more in small models, as long as restarts register no more photos than this.
+    cheap_restarts: int = 40
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
@@ -57,7 +61,7 @@ class AtlasOptions:
         for name in ("max_missed_share", "min_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be from 0 to 1, got {getattr(self, name)}")
-        for name in ("fresh_starts", "max_failures"):
+        for name in ("fresh_starts", "max_failures", "cheap_restarts"):
             if getattr(self, name) < 0:
                 raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}")
 
@@ -158,6 +162,18 @@ class Atlas:
             self._start_near(image_id)
         return sorted(self.registered - before)
 
+    def take_pairs(self, pairs: Sequence[PairGeometry]) -> None:
+        """Take in pairs of photos that are there already, and place all that can be placed."""
+        self.view_graph.add_pairs(pairs)
+        image_ids = sorted({i for pair in pairs for i in (pair.image_id1, pair.image_id2)})
+        for model in self.models:
+            model.take_pairs(image_ids)
+        self.models = [self._loops.close(model, image_ids) for model in self.models]
+        self.grow()
+        for image_id in image_ids:
+            if image_id in self.waiting:
+                self._start_near(image_id)
+
     def locate(self, view: View, pairs: Iterable[PairGeometry]) -> PosedCamera | None:
         """Pose in the largest model of a photo that is not in the view graph yet, by these pairs.
 
@@ -192,10 +208,6 @@ class Atlas:
         self.drop_covered()
         return grew
 
-    def close_loops(self) -> None:
-        """Close all loops of all models, whichever photos complete them."""
-        self.models = [self._loops.close(m, sorted(m.registered)) for m in self.models]
-
     def settle(self) -> bool:
         """Refine all models, and register what fits them then.
 
@@ -207,8 +219,10 @@ class Atlas:
         return not self.grow()
 
     def refine_until_stable(self) -> None:
-        """Grow and refine in turn until nothing more registers; failed photos are retried."""
+        """Close loops, grow and refine in turn until nothing more registers; what failed is
+        retried."""
         self._forget_failures()
+        self.models = [self._loops.close(m, sorted(m.registered)) for m in self.models]
         while self.grow():
             for model in self.models:
                 model.refine()

@@ -9,27 +9,30 @@ from sfm_front.events import DropReason, RegisteredStructureLess, StartKind
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.initialization import Initializer
 from sfm_front.mapping.model import Model
+from sfm_front.mapping.restart import Restart
 
 
-def finish(atlas: Atlas) -> None:
+def finish(atlas: Atlas, restart: Restart | None = None) -> None:
     """Retry what waits, restart where the stream began badly, refine everything.
 
-    The models of the atlas cannot grow any more after this.
+    ``restart``: the one that may be under way. The models of the atlas cannot grow any more after
+    this.
     """
-    _Finishing(atlas).run()
+    _Finishing(atlas, restart or Restart(atlas)).run()
 
 
 class _Finishing:
-    def __init__(self, atlas: Atlas) -> None:
+    def __init__(self, atlas: Atlas, restart: Restart) -> None:
         self._atlas = atlas
         self._view_graph = atlas.view_graph
         self._options = atlas.options
         self._initializer = atlas.initializer
+        self._restart = restart
 
     def run(self) -> None:
-        self._atlas.close_loops()
         self._atlas.refine_until_stable()
-        self._restart_largest()
+        while self._restart.go_on():
+            pass
         self._start_remaining()
         self._fix_intrinsics()
         self._drop_small()
@@ -39,30 +42,6 @@ class _Finishing:
             model.finish()
         self._drop_without_pairs()
         self._atlas.drop_covered()
-
-    def _restart_largest(self) -> None:
-        """If the largest model misses photos linked to it, restart it.
-
-        The stream had to take the first acceptable pair; the whole graph offers better ones. The
-        better of old and new stays.
-        """
-        failures = 0
-        starts = self._initializer.best_starts(self._options.fresh_starts)
-        while failures < self._options.max_failures and self._misses_photos():
-            fresh = next(starts, None)
-            if fresh is None:
-                return
-            fresh.grow(self._view_graph.image_ids)
-            best = self._atlas.models[0].num_registered if self._atlas.models else 0
-            if fresh.num_registered > best:
-                self._atlas.models.insert(0, fresh)
-                self._atlas.close_loops()
-                self._atlas.refine_until_stable()
-                continue
-            self._atlas.announce_drop(fresh, DropReason.NO_BETTER)
-            if 2 * fresh.num_registered > best:
-                # It grew far and still registered no more: another start hardly will.
-                failures += 1
 
     def _fix_intrinsics(self) -> None:
         """Grow models anew whose photos do not tell what their camera is, with what EXIF says.
@@ -84,16 +63,6 @@ class _Finishing:
             self._atlas.announce_drop(model, DropReason.REPLACED)
         if miscalibrated:
             self._atlas.refine_until_stable()
-
-    def _misses_photos(self) -> bool:
-        """Whether photos linked to the largest model are in none, or too many in others."""
-        if not self._atlas.models:
-            return True
-        model = self._atlas.models[0]
-        linked = self._view_graph.component(model.registered)
-        if len(linked - self._atlas.registered) > self._options.max_missed_share * len(linked):
-            return True
-        return model.num_registered < self._options.min_share * len(linked)
 
     def _start_remaining(self) -> None:
         """Further models from photos that are linked to each other and fit nowhere."""

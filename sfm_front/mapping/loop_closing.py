@@ -15,7 +15,7 @@ from sfm_front.events import Emit, LoopClosed
 from sfm_front.geometry.similarity import Similarities
 from sfm_front.mapping.acceptance import AcceptanceOptions, is_sound
 from sfm_front.mapping.bridging import Bridging, BridgingOptions, find_bridging
-from sfm_front.mapping.drift import move_photos, spread
+from sfm_front.mapping.drift import Correction, corrections, move
 from sfm_front.mapping.model import Model
 from sfm_front.mapping.point_matches import Side
 from sfm_front.mapping.view_graph import ViewGraph
@@ -89,12 +89,12 @@ class LoopCloser:
         if drift_px < self._options.min_drift_px:
             return None
         links = self._links(reconstruction)
-        shares = spread(links, here.image_ids, old.image_ids)
-        if max(abs(shares[i] - shares[j]) for i, j in links) > self._options.max_step:
+        correction = Correction(bridging.first_from_second, here.image_ids, old.image_ids)
+        found = corrections(reconstruction, links, correction)
+        if max(abs(found[i][0] - found[j][0]) for i, j in links) > self._options.max_step:
             return None
         corrected = copy.deepcopy(reconstruction)
-        center = bridging.matches.xyz[1].mean(axis=0)
-        move_photos(corrected, bridging.first_from_second, center, shares)
+        move(corrected, {i: similarity for i, (_, similarity) in found.items()})
         _merge(corrected, bridging.same_points)
         closed = model.succeeded_by(corrected)
         closed.refine_briefly()

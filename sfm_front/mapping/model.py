@@ -171,15 +171,15 @@ class Model:
         self._note_refined()
         return True
 
-    def grow(self, photos: Iterable[int]) -> list[int]:
-        """Register all of these that see enough of the model, the best one first.
+    def grow(self, photos: Iterable[int], at_most: int | None = None) -> list[int]:
+        """Register all of these that see enough of the model, the best one first, or the best few.
 
         Registered ones are skipped. Returns the image ids in order of registration.
         """
         self._take_refined()
         placed: list[int] = []
         left = set(photos) - self.registered
-        while (image_id := self._best(left)) is not None:
+        while len(placed) != at_most and (image_id := self._best(left)) is not None:
             left.discard(image_id)
             if self._register(image_id):
                 placed.append(image_id)

@@ -66,6 +66,11 @@ class ViewGraph:
         return len(self._neighbors)
 
     @property
+    def num_pairs(self) -> int:
+        """Verified pairs."""
+        return len(self._angles_rad)
+
+    @property
     def image_ids(self) -> list[int]:
         """In order of arrival."""
         return list(self._neighbors)

@@ -16,6 +16,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``models_joined`` | two became one: by which bridge photos, on how many common points |
 | ``loop_closed`` | a model came back to a known place, and its drift was spread |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
+| ``looked_again`` | a poorly connected photo was matched with more: ``found`` overlap |
 | ``session_ended`` | ``finished``: whether all models are written |
 
 New fields and events leave the version as it is; readers pass over what they do not know.
@@ -35,6 +36,7 @@ from typing import IO, Any
 from sfm_front.errors import StorageError
 from sfm_front.events import (
     Event,
+    LookedAgain,
     LoopClosed,
     ModelDropped,
     ModelRefined,
@@ -69,6 +71,7 @@ _NAMES: dict[type, str] = {
     ModelsJoined: "models_joined",
     LoopClosed: "loop_closed",
     RegisteredStructureLess: "registered_structure_less",
+    LookedAgain: "looked_again",
     SessionEnded: "session_ended",
 }
 

@@ -40,20 +40,22 @@ class CandidateVerdict:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """One photo's way: ``candidates`` before it arrived, verified pairs with ``later`` photos.
+    """One photo's way: ``candidates`` before it arrived, and verified pairs with ``others``.
 
     ``skipped`` is the reason if the file was not used; ``model`` the folder of the largest model
-    that holds the photo, with the number of its points that it sees; ``why_not`` what kept it out.
+    that holds the photo, with the number of its points that it sees; ``why_not`` what kept it out,
+    and ``hint`` what would help.
     """
 
     name: str
     skipped: str
     num_keypoints: int
     candidates: tuple[CandidateVerdict, ...]
-    later: Mapping[str, int]
+    others: Mapping[str, int]
     model: str | None
     num_points: int
     why_not: str
+    hint: str
 
     def __str__(self) -> str:
         if self.skipped:
@@ -63,7 +65,10 @@ class Explanation:
             if self.model
             else f"not placed: {self.why_not}"
         )
-        lines = [f"{self.name}: {placed}", f"{self.num_keypoints} keypoints"]
+        lines = [f"{self.name}: {placed}"]
+        if self.hint:
+            lines.append(self.hint)
+        lines.append(f"{self.num_keypoints} keypoints")
         if self.candidates:
             lines.append("candidates, as re-ranked (cosine, inliers of re-ranking, verdict):")
         else:
@@ -73,9 +78,9 @@ class Explanation:
             lines.append(
                 f"  {candidate.name}  {candidate.cosine:.3f}  {inliers:>4}  {_verdict(candidate)}"
             )
-        if self.later:
-            lines.append("verified with photos that came later (inliers):")
-            lines += [f"  {name}  {inliers}" for name, inliers in self.later.items()]
+        if self.others:
+            lines.append("verified with others, that came later or on a second look (inliers):")
+            lines += [f"  {name}  {inliers}" for name, inliers in self.others.items()]
         return "\n".join(lines)
 
 
@@ -103,18 +108,18 @@ def explain(output: Path, name: str) -> Explanation:
     summary = read_report(output)
     photo = _photo(summary, name, output)
     if isinstance(photo, Skipped):
-        return Explanation(name, str(photo), 0, (), {}, None, 0, "")
+        return Explanation(name, str(photo), 0, (), {}, None, 0, "", "")
     with pycolmap.Database.open(output / DATABASE) as database:
         ids = {image.name: image.image_id for image in database.read_all_images()}
         candidates = tuple(
             _verdict_of(database, ids, name, candidate)
             for candidate in read_candidates(output, name)
         )
-        earlier = {candidate.name for candidate in candidates}
-        later = {
+        known = {c.name for c in candidates if c.num_verified is not None}
+        others = {
             other: inliers
             for other, image_id in ids.items()
-            if other not in earlier and (inliers := _num_inliers(database, ids[name], image_id))
+            if other not in known and (inliers := _num_inliers(database, ids[name], image_id))
         }
     model = None if photo.model is None else summary.models[photo.model].path
     return Explanation(
@@ -122,10 +127,11 @@ def explain(output: Path, name: str) -> Explanation:
         skipped="",
         num_keypoints=photo.num_keypoints,
         candidates=candidates,
-        later=later,
+        others=others,
         model=model,
         num_points=0 if model is None else _num_points(output / model, ids[name]),
         why_not=photo.why_not or "",
+        hint=photo.hint,
     )
 
 

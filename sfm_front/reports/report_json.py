@@ -90,6 +90,7 @@ def _row(photo: Outcome) -> dict[str, Any]:
         "registered": photo.model is not None,
         "model": photo.model,
         "why_not_registered": photo.why_not,
+        "what_would_help": photo.hint,
         "keypoints": photo.num_keypoints,
         "most_relevant": photo.most_relevant,
         "verified_pairs": photo.num_verified,
@@ -162,4 +163,5 @@ def _outcome(row: dict[str, Any]) -> Outcome:
         placed=tuple(row["placed_by_this_step"]),
         seconds=row["seconds"],
         events=tuple(row["events"]),
+        hint=row.get("what_would_help", ""),  # absent in reports of earlier versions
     )

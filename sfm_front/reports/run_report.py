@@ -55,6 +55,7 @@ class RunReport:
         self,
         models: Sequence[ModelSummary],
         why_not: Mapping[int, str],
+        hints: Mapping[int, str],
         *,
         seconds: Mapping[str, float],
         events: Sequence[ModelEvent],
@@ -62,9 +63,9 @@ class RunReport:
     ) -> RunSummary:
         """Sum up.
 
-        ``why_not``: image id → why it is in no model. ``seconds`` by stage and ``events`` of the
-        end and of idle times. ``latencies_s``: from arrival to pose, of each photo of this run that
-        was placed.
+        ``why_not``: image id → why it is in no model, ``hints``: what would help. ``seconds`` by
+        stage and ``events`` of the end and of idle times. ``latencies_s``: from arrival to pose, of
+        each photo of this run that was placed.
         """
         model_of = {
             image_id: number
@@ -72,7 +73,7 @@ class RunReport:
             for image_id in model.reconstruction.reg_image_ids()
         }
         return RunSummary(
-            photos=tuple(_outcome(photo, model_of, why_not) for photo in self._photos),
+            photos=tuple(_outcome(photo, model_of, why_not, hints) for photo in self._photos),
             models=tuple(
                 ModelOutcome(
                     f"{model.path.parent.name}/{model.path.name}",
@@ -118,7 +119,10 @@ class RunReport:
 
 
 def _outcome(
-    photo: Skipped | PhotoAdded, model_of: Mapping[int, int], why_not: Mapping[int, str]
+    photo: Skipped | PhotoAdded,
+    model_of: Mapping[int, int],
+    why_not: Mapping[int, str],
+    hints: Mapping[int, str],
 ) -> Outcome:
     if isinstance(photo, Skipped):
         return photo
@@ -134,6 +138,7 @@ def _outcome(
         placed=photo.registered,
         seconds=photo.seconds,
         events=_in_words(photo.events),
+        hint=hints.get(photo.image_id, ""),
     )
 
 

@@ -15,7 +15,8 @@ from sfm_front.types import Skipped
 class PhotoOutcome:
     """What became of a photo that was used.
 
-    ``model``: number of the largest model that holds it; if None, ``why_not`` says why.
+    ``model``: number of the largest model that holds it; if None, ``why_not`` says why, and
+    ``hint`` what would help.
     ``num_verified`` and ``num_rejected`` count its pairs with earlier photos. ``placed`` names the
     photos that were registered when it arrived. ``seconds`` is by stage; ``events`` are in words.
     """
@@ -31,6 +32,7 @@ class PhotoOutcome:
     placed: tuple[str, ...]
     seconds: dict[str, float]
     events: tuple[str, ...]
+    hint: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,10 +40,14 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
             f"from arrival to pose: median {latency.median_s:.2f} s, "
             f"95 % within {latency.p95_s:.2f} s, worst {latency.worst_s:.2f} s"
         )
-    lines += _reasons("skipped", [(photo.name, str(photo)) for photo in summary.skipped])
+    lines += _reasons("skipped", [(photo.name, str(photo), "") for photo in summary.skipped])
     lines += _reasons(
         "not registered",
-        [(photo.name, photo.why_not or "") for photo in summary.used if photo.model is None],
+        [
+            (photo.name, photo.why_not or "", photo.hint)
+            for photo in summary.used
+            if photo.model is None
+        ],
     )
     if not summary.models:
         lines.append(_advice(summary))
@@ -67,13 +71,19 @@ def _advice(summary: RunSummary) -> str:
     )
 
 
-def _reasons(what: str, rows: list[tuple[str, str]]) -> list[str]:
-    """Every file with its reason, or how often each reason came where there are many."""
+def _reasons(what: str, rows: list[tuple[str, str, str]]) -> list[str]:
+    """Every file with its reason and what would help, or how often each reason came where there
+    are many."""
     if not rows:
         return []
     if len(rows) <= 20:
-        return [f"{what}:", *(f"  {name}: {why}" for name, why in rows)]
-    counted = Counter(why for _, why in rows).most_common(10)
+        lines = [f"{what}:"]
+        for name, why, hint in rows:
+            lines.append(f"  {name}: {why}")
+            if hint:
+                lines.append(f"    {hint}")
+        return lines
+    counted = Counter(why for _, why, _ in rows).most_common(10)
     return [
         f"{what}: {len(rows)} photos (each in report.json)",
         *(f"  {count} × {why}" for why, count in counted),

@@ -77,6 +77,12 @@ class CosineIndex:
         self._rows[image_id] = len(self)
         self._image_ids.append(image_id)
 
+    def vector(self, image_id: int) -> Float32Array:
+        """The (dimension,) vector of a photo, as far as 8 bits per number keep it."""
+        row = self._rows[image_id]
+        vector: Float32Array = self._vectors.reconstruct(row) * np.float32(self._peaks[row])
+        return vector
+
     def query(
         self,
         vector: Float32Array,
@@ -127,7 +133,7 @@ class CosineIndex:
     def _expanded(self, vector: Float32Array, rows: Iterable[int]) -> Float32Array:
         wider: Float32Array = vector.copy()
         for row in rows:
-            other = np.asarray(self._vectors.reconstruct(row)) * self._peaks[row]
+            other = self.vector(self._image_ids[row])
             wider += max(0.0, float(vector @ other)) * other
         return wider
 

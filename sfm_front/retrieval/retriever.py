@@ -8,7 +8,7 @@ feature model for object retrieval", ICCV 2007.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from sfm_front.errors import ConfigError
@@ -52,6 +52,25 @@ class Retriever:
         """The coarse step: photos nearest to a (dimension,) global vector, expanded, best first."""
         options = self._options
         return self._index.query(vector, options.candidates, num_expansion=options.num_expansion)
+
+    def nearest(
+        self,
+        image_id: int,
+        count: int,
+        *,
+        without: Collection[int] = (),
+        expand_with: Iterable[int] = (),
+    ) -> list[int]:
+        """Of the photos that are not in ``without``, the ``count`` nearest to a photo that is
+        remembered, best first: image ids. ``expand_with``: photos known to overlap with it."""
+        expand_with = list(expand_with)
+        found = self._index.query(
+            self._index.vector(image_id),
+            count + len(without),
+            num_expansion=0 if expand_with else self._options.num_expansion,
+            expand_with=expand_with,
+        )
+        return [c.image_id for c in found if c.image_id not in without][:count]
 
     def rank(
         self, vector: Float32Array, reranked: Sequence[RankedCandidate], *, min_inliers: int

@@ -18,6 +18,7 @@ from sfm_front.photos.reader import PhotoReader
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
 from sfm_front.session.pair_matching import PairMatchingOptions
+from sfm_front.session.second_look import SecondLookOptions
 
 
 def available_cores() -> int:
@@ -86,6 +87,8 @@ class SessionOptions:
     guided: GuidedOptions = field(default_factory=GuidedOptions)
     # Which pairs of photos are accepted.
     verification: VerificationOptions = field(default_factory=VerificationOptions)
+    # Which photos are matched once more, with more candidates, and how much that may cost.
+    second_look: SecondLookOptions = field(default_factory=SecondLookOptions)
     # How the models grow.
     atlas: AtlasOptions = field(default_factory=AtlasOptions)
 

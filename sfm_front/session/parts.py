@@ -10,6 +10,7 @@ from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
+from sfm_front.mapping.restart import Restart
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import make_matcher
@@ -25,6 +26,7 @@ from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.session.photo_folders import PhotoFolders
+from sfm_front.session.second_look import SecondLook
 from sfm_front.session.snapshots import Snapshot
 from sfm_front.storage.database import DATABASE, PhotoDatabase
 
@@ -41,6 +43,8 @@ class SessionParts:
     catalog: PhotoCatalog
     view_graph: ViewGraph
     atlas: Atlas
+    restart: Restart
+    second_look: SecondLook
     report: RunReport
 
 
@@ -77,16 +81,32 @@ def open_parts(
     # With one thread a session is the same to the bit each time: nothing runs beside it.
     adjuster = opened.enter_context(BackgroundAdjuster()) if threads > 1 else None
     cameras = CameraCatalog(options.cameras, PhotoFolders(database).folder_of)
+    catalog = PhotoCatalog(cameras, database.features, options.cache_bytes)
+    retriever = Retriever(options.retrieval, descriptor.dimension)
     view_graph = ViewGraph()
+    atlas = Atlas(view_graph, options.atlas, announcer.tell_of_model, adjuster)
+    second_look = SecondLook(
+        options.second_look,
+        retriever,
+        matcher,
+        verifier,
+        workers,
+        catalog,
+        database,
+        atlas,
+        announcer.tell_of_model,
+    )
     return SessionParts(
         extraction=extraction,
-        retriever=Retriever(options.retrieval, descriptor.dimension),
+        retriever=retriever,
         reranker=reranker,
         pairs=pairs,
         database=database,
-        catalog=PhotoCatalog(cameras, database.features, options.cache_bytes),
+        catalog=catalog,
         view_graph=view_graph,
-        atlas=Atlas(view_graph, options.atlas, announcer.tell_of_model, adjuster),
+        atlas=atlas,
+        restart=Restart(atlas),
+        second_look=second_look,
         report=RunReport(),
     )
 

@@ -29,6 +29,7 @@ from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.session.announcer import Announcer
+from sfm_front.session.hints import hint
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import check_output_folder, open_output_folder
 from sfm_front.session.parts import open_parts, restore
@@ -45,6 +46,7 @@ from sfm_front.types import (
     PhotoPath,
     RankedCandidate,
     Rejected,
+    Rejection,
     Skipped,
 )
 from sfm_front.version import VERSION
@@ -53,6 +55,8 @@ Result = TypeVar("Result")
 
 # Photos that follow each other faster than this must not wait for a refinement.
 _IDLE_AFTER_S = 2.0
+# A restart registers so many photos before it is asked again whether another one has come.
+_PHOTOS_AT_A_TIME = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,17 +165,27 @@ class Session(Closeable):
                 yield self.add_extracted(extracted)
 
     def idle(self, seconds: float) -> None:
-        """Nothing has arrived for ``seconds``, and nothing is under way: refine, and retry photos
-        that wait, until nothing changes any more. To be called again and again meanwhile."""
+        """Nothing has arrived for ``seconds``, and nothing is under way: refine, retry photos that
+        wait, and look again at those poorly connected, until nothing changes any more. To be
+        called again and again meanwhile."""
         if self._idle_since_s is None:
             self._idle_since_s = time.monotonic()
         if self._is_settled or seconds < _IDLE_AFTER_S:
             return
-        self._is_settled = self._placing_more(self._parts.atlas.settle)
+        self._is_settled = self._placing_more(self._settle)
         # The next photo must not be charged with them.
         self._idle_events += self._announcer.pop_model_events()
         if self._is_settled:
             self._write_snapshot()
+
+    def _settle(self) -> bool:
+        """Do what is next; True if nothing is left to be done."""
+        parts = self._parts
+        return (
+            parts.atlas.settle()
+            and not parts.second_look.while_idle()
+            and not parts.restart.go_on(_PHOTOS_AT_A_TIME)
+        )
 
     @property
     def idle_s(self) -> float:
@@ -208,13 +222,17 @@ class Session(Closeable):
             raise RuntimeError("the session is finished already")
         self._finished = True
         clock = Stopwatch()
+        with clock.stage("look again"):
+            self._placing_more(self._parts.second_look.at_end)
         with clock.stage("finish"):
-            self._placing_more(lambda: finish(self._parts.atlas))
+            self._placing_more(lambda: finish(self._parts.atlas, self._parts.restart))
         with clock.stage("export"):
             models = self._write_snapshot(final=True)
+        waiting = self._parts.atlas.waiting
         summary = self._parts.report.finish(
             models,
-            {i: self._parts.atlas.why_not_registered(i) for i in self._parts.atlas.waiting},
+            {image_id: self._parts.atlas.why_not_registered(image_id) for image_id in waiting},
+            {image_id: self._hint(image_id) for image_id in waiting},
             seconds=clock.seconds,
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
@@ -239,6 +257,11 @@ class Session(Closeable):
                     SessionEnded(False, len(self._parts.catalog), num_registered, num_models)
                 )
         self._opened.close()
+
+    def _hint(self, image_id: int) -> str:
+        atlas = self._parts.atlas
+        nearest = self._parts.retriever.nearest(image_id, self.options.second_look.candidates)
+        return hint(image_id, atlas.view_graph, atlas.registered, nearest)
 
     def _placing_more(self, act: Callable[[], Result]) -> Result:
         """Do something that may place photos that wait, and tell of those."""
@@ -301,6 +324,9 @@ class Session(Closeable):
         )
         self._is_settled = False
         self._tell(added, registered)
+        tried = (i for i, why in rejected.items() if why.reason is not Rejection.UNLIKELY)
+        parts.second_look.note(image_id, tried)
+        self._placing_more(lambda: parts.second_look.after_photo(image_id))
         return added
 
     def _tell(self, added: PhotoAdded, registered: Sequence[int]) -> None:

@@ -45,7 +45,7 @@ def test_a_placed_photo_tells_its_model_and_its_verified_candidates(output, caps
     assert int(told[0].split()[-4]) > 50
     (candidate,) = (line for line in told if line.startswith("  0001.jpg"))
     assert "verified: " in candidate
-    assert "verified with photos that came later (inliers):" in told
+    assert "verified with others, that came later or on a second look (inliers):" in told
 
 
 def test_a_photo_that_was_not_placed_tells_why(output, capsys):

@@ -81,6 +81,7 @@ def run(tmp_path) -> RunSummary:
     return report.finish(
         models,
         why_not,
+        {3: "take one between them"},
         seconds={"export": 0.75},
         events=[REFINED, STARTED],
         latencies_s=[2.0, 0.12345678],
@@ -114,6 +115,7 @@ def test_a_row_a_photo_in_their_order(content):
     assert (third["registered"], third["model"]) == (False, None)
     assert (third["verified_pairs"], third["rejected_pairs"]) == (0, 1)
     assert third["why_not_registered"] == "no verified matches"
+    assert third["what_would_help"] == "take one between them"
     assert first["why_not_registered"] is None
 
 
@@ -182,14 +184,14 @@ def test_work_by_quarter_is_what_a_photo_waits_for_in_its_turn():
     for number in range(1, 9):
         seconds = {"match": float(number), "refine": 100.0, "sift": 10.0, "read": 1.0}
         report.add(PhotoAdded(f"{number}.jpg", image_id=number, seconds=seconds))
-    run = report.finish([], {}, seconds={}, events=(), latencies_s=())
+    run = report.finish([], {}, {}, seconds={}, events=(), latencies_s=())
     assert run.totals.median_seconds_by_quarter == (1.5, 3.5, 5.5, 7.5)
 
 
 def test_without_models_there_is_still_a_report():
     report = RunReport()
     report.add(BROKEN)
-    run = report.finish([], {}, seconds={}, events=[], latencies_s=[])
+    run = report.finish([], {}, {}, seconds={}, events=[], latencies_s=[])
     assert run.models == ()
     assert run.totals.num_registered == 0
     assert run.totals.mean_reprojection_error_px is None
@@ -202,12 +204,12 @@ def test_a_photo_that_was_skipped_and_comes_again_counts_once():
     copy = Skipped("a.jpg", SkipReason.DUPLICATE, "same file as a.jpg")
     for photo in (Skipped("a.jpg", SkipReason.TRUNCATED), BROKEN, BROKEN, whole):
         report.add(photo)
-    run = report.finish([], {}, seconds={}, events=[], latencies_s=[])
+    run = report.finish([], {}, {}, seconds={}, events=[], latencies_s=[])
     assert [photo.name for photo in run.photos] == ["broken.jpg", "a.jpg"]
     assert run.skipped == [BROKEN]
     # A copy under the same name does not take the place of the photo itself.
     report.add(copy)
-    run = report.finish([], {}, seconds={}, events=[], latencies_s=[])
+    run = report.finish([], {}, {}, seconds={}, events=[], latencies_s=[])
     assert run.skipped == [BROKEN, copy]
     assert len(run.used) == 1
 

@@ -54,7 +54,7 @@ def test_the_summary_says_what_became_of_all():
     photos = [
         PLACED,
         replace(PLACED, name="b.jpg"),
-        waiting("c.jpg", "no verified matches"),
+        replace(waiting("c.jpg", "no verified matches"), hint="take one between"),
         Skipped("d.jpg", SkipReason.EMPTY_FILE),
         Skipped("e.jpg", SkipReason.TOO_SMALL, "20 x 20"),
     ]
@@ -69,6 +69,7 @@ def test_the_summary_says_what_became_of_all():
         "  e.jpg: too small: 20 x 20",
         "not registered:",
         "  c.jpg: no verified matches",
+        "    take one between",
     ]
 
 

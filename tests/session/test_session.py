@@ -237,7 +237,7 @@ def test_reports_are_written(session):
     report = json.loads((output / "report.json").read_text(encoding="utf-8"))
     assert report["totals"]["registered"] == NUM_PHOTOS
     assert all(row["registered"] and row["model"] == 0 for row in report["photos"])
-    assert set(report["end"]["seconds"]) == {"finish", "export"}
+    assert set(report["end"]["seconds"]) == {"look again", "finish", "export"}
 
 
 def test_shuffled_photos_are_all_registered(orbit, tmp_path):

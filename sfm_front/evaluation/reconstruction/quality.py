@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sfm_front.evaluation.gps import gps_residual_m
 from sfm_front.evaluation.poses import auc, pose_errors
 from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene
+from sfm_front.photos.exif import read_exif
 from sfm_front.storage.colmap_models import read_model
 
 if TYPE_CHECKING:
@@ -22,6 +24,8 @@ class Quality:
     ``points`` and ``reprojection_error_px`` are over all models. ``auc`` is that of the pose
     errors at 1, 3 and 5 degrees, in [0, 1]; None without ground truth. ``pairs_joined`` is the
     fraction of the pairs known to overlap with both photos in one model; None if none are known.
+    ``mixed`` counts models with photos of several landmarks; None if these are not known.
+    ``gps_residual_m`` is that of the largest model; None without GPS.
     """
 
     registered: int
@@ -31,6 +35,8 @@ class Quality:
     reprojection_error_px: float | None
     auc: tuple[float, ...] | None
     pairs_joined: float | None
+    mixed: int | None
+    gps_residual_m: float | None
 
 
 def assess(folders: Sequence[Path], scene: BenchmarkScene) -> Quality:
@@ -46,6 +52,8 @@ def assess(folders: Sequence[Path], scene: BenchmarkScene) -> Quality:
         reprojection_error_px=_reprojection_error_px(models) if points else None,
         auc=_auc(models, scene),
         pairs_joined=_pairs_joined(names, scene),
+        mixed=_mixed(names, scene),
+        gps_residual_m=_gps_residual_m(models, scene),
     )
 
 
@@ -82,3 +90,21 @@ def _pairs_joined(names: Sequence[set[str]], scene: BenchmarkScene) -> float | N
         for first, second in scene.pairs
     )
     return joined / len(scene.pairs)
+
+
+def _mixed(names: Sequence[set[str]], scene: BenchmarkScene) -> int | None:
+    if scene.landmarks is None:
+        return None
+    landmarks = scene.landmarks
+    return sum(len({landmarks[name] for name in model}) > 1 for model in names)
+
+
+def _gps_residual_m(
+    models: Sequence[pycolmap.Reconstruction], scene: BenchmarkScene
+) -> float | None:
+    if not models:
+        return None
+    largest = max(models, key=lambda model: model.num_reg_images())
+    names = [largest.images[image_id].name for image_id in largest.reg_image_ids()]
+    positions = {name: read_exif(scene.photos / name).position for name in names}
+    return gps_residual_m(largest, {name: p for name, p in positions.items() if p is not None})

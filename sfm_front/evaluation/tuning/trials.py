@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
 
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.evaluation.reconstruction.quality import Quality, assess
-from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene, find_scene
+from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene, find_scene, limited_to
 from sfm_front.evaluation.tuning.arrangements import arrange
 from sfm_front.evaluation.tuning.option_paths import nearest
 from sfm_front.events import PhotoAdded
@@ -23,7 +23,6 @@ from sfm_front.photos.source import list_photos
 from sfm_front.runtime.devices import usable_device
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
-from sfm_front.storage.colmap_models import read_model
 from sfm_front.types import ExtractedPhoto, Skipped
 
 Described = ExtractedPhoto | Skipped
@@ -79,6 +78,18 @@ def find_scenes(data: Path, names: Sequence[str] | None) -> list[BenchmarkScene]
                 f"{data}: no scene {name!r} in it; did you mean {nearest(name, scenes)}?"
             )
     return [scenes[name] for name in (names or scenes)]
+
+
+def num_photos(scene: BenchmarkScene, arrangements: Sequence[str], num_options: int = 1) -> int:
+    """How many photos are described or taken in."""
+    arriving = sum(len(arrange(range(scene.num_photos), name)) for name in arrangements)
+    return scene.num_photos + num_options * arriving
+
+
+def counter(show: Callable[[int, int], None], total: int) -> Callable[[], None]:
+    """To be called for each photo: shows how many are done, of ``total``."""
+    done = itertools.count(1)
+    return lambda: show(next(done), total)
 
 
 def describe(
@@ -144,7 +155,7 @@ def run_trial(
                 count()
             models = [model.path for model in session.finish().models]
         seconds = process_time() - started
-        quality = assess(models, _limited_to(scene, [photo.name for photo in arriving]))
+        quality = assess(models, limited_to(scene, [photo.name for photo in arriving]))
     return Trial(
         scene=scene.name,
         arrangement=arrangement,
@@ -153,14 +164,3 @@ def run_trial(
         verified_pairs=verified_pairs,
         seconds=seconds,
     )
-
-
-def _limited_to(scene: BenchmarkScene, names: Iterable[str]) -> BenchmarkScene:
-    """The scene with only the pairs of photos that arrive: no others can be in a model."""
-    if scene.truth is None:
-        return scene
-    arriving = {name.casefold() for name in names}
-    truth = read_model(scene.truth)
-    pairs = scene.pairs or combinations([truth.images[i].name for i in truth.reg_image_ids()], 2)
-    kept = tuple(pair for pair in pairs if arriving.issuperset(map(str.casefold, pair)))
-    return replace(scene, pairs=kept)

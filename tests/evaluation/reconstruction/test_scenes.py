@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from helpers.benchmark_folder import CAMERAS, noise_photos, write_model
+from helpers.model_building import looking
+from PIL import ExifTags, Image
 
 from sfm_front.errors import InputError
 from sfm_front.evaluation.reconstruction.quality import assess
-from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene, find_scene
+from sfm_front.evaluation.reconstruction.scenes import (
+    BenchmarkScene,
+    find_scene,
+    limited_to,
+    with_landmarks,
+)
 
 
 def some(*names):
@@ -75,6 +84,57 @@ def test_models_are_judged_together(tmp_path, photos):
     assert first.pairs_joined == 0.75
     # Three of four errors are nought, one is infinite.
     assert first.auc == pytest.approx([0.75, 0.75, 0.75], abs=1e-5)
+
+
+def test_photos_left_out_are_not_missed(tmp_path, photos):
+    truth = write_model(tmp_path / "truth", CAMERAS)
+    scene = BenchmarkScene(name="scene", photos=photos, num_photos=4, truth=truth)
+    folder = write_model(tmp_path / "0", some("0.jpg", "2.jpg"))
+    assert assess([folder], scene).auc == pytest.approx([1 / 6] * 3, abs=1e-5)
+    limited = limited_to(scene, ["0.jpg", "2.JPG"])
+    assert assess([folder], limited).auc == pytest.approx([1, 1, 1], abs=1e-5)
+    listed = replace(scene, pairs=(("0.jpg", "1.jpg"), ("2.jpg", "0.jpg")))
+    assert limited_to(listed, ["0.jpg", "2.jpg"]).pairs == (("2.jpg", "0.jpg"),)
+
+
+def test_models_of_several_landmarks_are_counted(tmp_path):
+    names = ["old_Bridge_12_7.jpg", "old_Bridge_3.jpg", "town/hall_1.JPG", "town/hall_22.png"]
+    photos = tmp_path / "photos"
+    for name in names:
+        (photos / name).parent.mkdir(parents=True, exist_ok=True)
+        (photos / name).touch()
+    scene = with_landmarks(BenchmarkScene(name="scene", photos=photos, num_photos=4))
+    assert list(scene.landmarks.values()) == 2 * ["old_bridge"] + 2 * ["town/hall"]
+    cameras = dict(zip(names, CAMERAS.values(), strict=True))
+    folders = [
+        write_model(tmp_path / str(number), {name: cameras[name] for name in chosen})
+        for number, chosen in enumerate((names[:2], names[2:], names[1:3]))
+    ]
+    assert assess(folders[:2], scene).mixed == 0
+    assert assess(folders, scene).mixed == 1
+    assert assess(folders, replace(scene, landmarks=None)).mixed is None
+
+
+def test_gps_is_read_from_the_photos_of_the_largest_model(tmp_path):
+    photos = noise_photos(tmp_path / "photos")
+    scene = BenchmarkScene(name="scene", photos=photos, num_photos=4)
+    # Metres. At the equator a degree of the meridian has 110 574, one of longitude 111 320.
+    centres = [(0, 0, 100), (0, 30, 110), (40, 30, 100), (40, 0, 105)]
+    cameras = {
+        name: looking(centre, [0, 0, -1], [0, 1, 0])
+        for name, centre in zip(CAMERAS, centres, strict=True)
+    }
+    folders = [
+        write_model(tmp_path / "0", {"0.jpg": cameras["0.jpg"]}),
+        write_model(tmp_path / "1", cameras),
+    ]
+    assert assess(folders, scene).gps_residual_m is None
+    for name, (x, y, z) in zip(CAMERAS, centres, strict=True):
+        exif = Image.Exif()
+        place = {2: (0, 0, 3600 * y / 110574), 4: (10, 0, 3600 * x / 111320), 6: z}
+        exif.get_ifd(ExifTags.IFD.GPSInfo).update({1: "N", 3: "E", **place})
+        Image.open(photos / name).save(photos / name, exif=exif)
+    assert assess(folders, scene).gps_residual_m < 0.01
 
 
 def test_no_model_is_worth_nothing(tmp_path, photos):

@@ -27,6 +27,8 @@ def row(scene, method, seconds, registered, **run):
         reprojection_error_px=0.5 if registered else None,
         auc=None,
         pairs_joined=None,
+        mixed=None,
+        gps_residual_m=None,
     )
     made = Run(wall_seconds=seconds, peak_memory_bytes=3 * 2**20, **run)
     return Row(scene, method, (Outcome(made, quality),))

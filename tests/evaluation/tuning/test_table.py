@@ -23,6 +23,8 @@ def trial(scene, arrangement, registered, auc=None, seconds=1.0):
         reprojection_error_px=0.5,
         auc=auc,
         pairs_joined=None,
+        mixed=None,
+        gps_residual_m=None,
     )
     return Trial(
         scene=scene,

@@ -1,0 +1,1 @@
+"""How much is registered when photos are few, or arrive in another order."""

@@ -1,0 +1,197 @@
+"""A second look at photos that are poorly connected: more candidates, all features, no early exits.
+
+What a photo is matched with when it arrives is chosen for dense captures. Where photos are wide
+steps apart, the largest features are the wrong sample: pairs with over a hundred inliers among all
+features had eight among those that re-ranking looks at.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
+from operator import itemgetter
+
+from sfm_front.errors import ConfigError
+from sfm_front.events import LookedAgain, ModelEvent
+from sfm_front.mapping.atlas import Atlas
+from sfm_front.matching.matcher import Matcher
+from sfm_front.matching.verification import Verifier
+from sfm_front.retrieval.retriever import Retriever
+from sfm_front.runtime.worker_pool import WorkerPool
+from sfm_front.session.catalog import PhotoCatalog
+from sfm_front.storage.database import PhotoDatabase
+from sfm_front.types import PairGeometry, Rejected, Uint32Array, View
+
+Pair = tuple[int, int]
+"""Image ids, that of the later photo first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SecondLookOptions:
+    """Which photos are looked at again, and how much that may cost."""
+
+    # Pairs that may be matched per photo of the session: this takes about as long as describing
+    # it, and is enough for all pairs of 25 photos.
+    pairs_per_photo: int = 12
+    # Nearest photos that a photo is matched with while nothing arrives, or if all pairs may be.
+    candidates: int = 24
+    # The same while others wait, and at the end.
+    hurried_candidates: int = 4
+    # A photo that waits is looked at after so many others: they may place it for nothing.
+    patience: int = 5
+    # Verified pairs within its model that a registered photo needs to count as well connected.
+    min_pairs: int = 3
+    # Of a model that is not the largest, how many of its well connected photos are looked at; in a
+    # session whose pairs may all be matched, all are.
+    per_model: int = 6
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            least = 1 if name == "per_model" else 0
+            if value < least:
+                raise ConfigError(f"{name} must be at least {least}, got {value}")
+
+
+class SecondLook:
+    """Finds pairs that were missed, and hands them to database, view graph and models."""
+
+    def __init__(
+        self,
+        options: SecondLookOptions,
+        retriever: Retriever,
+        matcher: Matcher,
+        verifier: Verifier,
+        workers: WorkerPool,
+        catalog: PhotoCatalog,
+        database: PhotoDatabase,
+        atlas: Atlas,
+        emit: Callable[[ModelEvent], None],
+    ) -> None:
+        """``emit`` hears what each look has found."""
+        self._options = options
+        self._retriever = retriever
+        self._matcher = matcher
+        self._verifier = verifier
+        self._workers = workers
+        self._catalog = catalog
+        self._database = database
+        self._atlas = atlas
+        self._emit = emit
+        # Image id → those it was matched with on all features, and does not overlap with.
+        self._apart: defaultdict[int, set[int]] = defaultdict(set)
+        self._num_matched = 0
+        # Image id → photos and candidates at the last look at it: with more, it may find more.
+        self._looked_in: dict[int, tuple[int, int]] = {}
+
+    def note(self, image_id: int, rejected: Iterable[int]) -> None:
+        """These earlier photos were matched with this one on all features, and do not overlap."""
+        for other in rejected:
+            self._apart[image_id].add(other)
+            self._apart[other].add(image_id)
+
+    def after_photo(self, image_id: int) -> None:
+        """A photo has been added: look again at an earlier one that still waits, with few pairs."""
+        atlas, earlier = self._atlas, image_id - self._options.patience
+        if earlier in atlas.waiting and self._has_few_pairs(earlier, atlas.view_graph.image_ids):
+            self._look(earlier, self._options.hurried_candidates)
+
+    def while_idle(self) -> bool:
+        """Look again at one photo that is poorly connected; False if no such look is left."""
+        return self._step(self._options.candidates)
+
+    def at_end(self) -> None:
+        """Place what can be placed, and look again at all that stays poorly connected."""
+        self._atlas.refine_until_stable()
+        most = self._options.hurried_candidates
+        while self._step(len(self._catalog) if self._can_afford_all else most):
+            pass
+
+    def _step(self, num_candidates: int) -> bool:
+        return any(self._look(image_id, num_candidates) for image_id in self._poorly_connected())
+
+    @property
+    def budget(self) -> int:
+        """Pairs that may still be matched."""
+        return self._options.pairs_per_photo * len(self._catalog) - self._num_matched
+
+    def _look(self, image_id: int, num_candidates: int) -> bool:
+        """True if there were pairs to match."""
+        circumstances = len(self._catalog), num_candidates
+        if self._looked_in.get(image_id) == circumstances:
+            return False
+        self._looked_in[image_id] = circumstances
+        chosen = self._chosen(image_id, num_candidates)
+        if not chosen:
+            return False
+        pairs = self._matched(chosen)
+        if pairs:
+            self._database.write_pairs(pairs)
+            self._atlas.take_pairs(pairs)
+        found = (i for pair in pairs for i in (pair.image_id1, pair.image_id2) if i != image_id)
+        self._emit(LookedAgain(image_id, tuple(found), len(chosen), self.budget))
+        return True
+
+    def _chosen(self, image_id: int, num_candidates: int) -> list[Pair]:
+        """The photo with the nearest of those that it may overlap with."""
+        known = self._atlas.view_graph.neighbors(image_id)
+        nearest = self._retriever.nearest(
+            image_id,
+            num_candidates,
+            without=known.keys() | self._apart[image_id] | self._companions(image_id),
+            expand_with=known,
+        )
+        pairs = [(max(image_id, other), min(image_id, other)) for other in nearest]
+        return pairs[: max(0, self.budget)]
+
+    def _companions(self, image_id: int) -> set[int]:
+        """Photos it stands well connected with: further pairs with these would add nothing."""
+        for model in self._atlas.models:
+            registered = model.registered
+            if image_id in registered and not self._has_few_pairs(image_id, registered):
+                return registered
+        return {image_id}
+
+    def _poorly_connected(self) -> list[int]:
+        """Photos in no model, those in one by few pairs, and some of each model but the largest."""
+        found = dict.fromkeys(self._atlas.waiting)
+        for number, model in enumerate(self._atlas.models):
+            registered = model.registered
+            photos = sorted(registered)
+            loose = [i for i in photos if self._has_few_pairs(i, registered)]
+            found.update(dict.fromkeys(loose))
+            if number > 0:
+                step = 1 if self._can_afford_all else -(-len(photos) // self._options.per_model)
+                found.update(dict.fromkeys(photos[::step]))
+        return list(found)
+
+    @property
+    def _can_afford_all(self) -> bool:
+        return len(self._catalog) <= 2 * self._options.pairs_per_photo + 1
+
+    def _has_few_pairs(self, image_id: int, photos: Collection[int]) -> bool:
+        pairs = self._atlas.view_graph.neighbors(image_id).keys() & photos
+        return len(pairs) < self._options.min_pairs
+
+    def _matched(self, pairs: Sequence[Pair]) -> list[PairGeometry]:
+        """Those that overlap, by all features."""
+        self._num_matched += len(pairs)
+        verified: list[PairGeometry] = []
+        for later_id, group in groupby(sorted(pairs), key=itemgetter(0)):
+            later, others = self._catalog[later_id], [self._catalog[i] for _, i in group]
+            matches = self._matcher.match(
+                later.features, [other.features for other in others], [None] * len(others)
+            )
+            verdicts = self._workers.map(
+                partial(self._verify, later), zip(others, matches, strict=True)
+            )
+            found = [pair for pair in verdicts if isinstance(pair, PairGeometry)]
+            overlapping = {pair.image_id2 for pair in found}
+            self.note(later_id, {other.image_id for other in others} - overlapping)
+            verified += found
+        return verified
+
+    def _verify(self, later: View, found: tuple[View, Uint32Array]) -> PairGeometry | Rejected:
+        return self._verifier.verify(later, *found)
