@@ -17,7 +17,7 @@ class AcceptanceOptions:
     """What refinement must leave of the parts."""
 
     # Share of the observations of each part.
-    min_kept: float = 0.9
+    min_kept: float = 0.93
     # Share of the matches on which it rests whose keypoints show one point.
     min_common: float = 0.5
 

@@ -21,10 +21,11 @@ class BridgingOptions:
     # Points of either side that agree on how they lie to each other: as many as ORB-SLAM3 asks for.
     min_matches: int = 20
     # Matches from which a bridge photo has a say, the share of them by which it agrees, and the
-    # share of such photos that must: one never decides against another.
+    # share of such photos that must: one never decides against another. Sound models agree nearly
+    # everywhere; a bent one agrees with another here and there.
     min_bridge_matches: int = 8
-    min_share: float = 0.5
-    min_agreeing: float = 0.6
+    min_share: float = 0.7
+    min_agreeing: float = 0.75
     # Matches used per bridge photo.
     sample: int = 200
     similarity: SimilarityOptions = field(default_factory=SimilarityOptions)

@@ -35,8 +35,9 @@ class LoopOptions:
     # Nothing has to be closed that lies nearer together than this, in pixels of the file: COLMAP
     # merges such points by itself.
     min_drift_px: float = 4.0
-    # Share of the drift that may fall between two photos: what bends more than that is no drift.
-    max_step: float = 0.34
+    # Share of the drift that may fall between two photos: what comes about on a shorter way is no
+    # drift, but a wrong match or a bent model.
+    max_step: float = 0.1
     bridging: BridgingOptions = field(default_factory=BridgingOptions)
     acceptance: AcceptanceOptions = field(default_factory=AcceptanceOptions)
 
@@ -89,7 +90,7 @@ class LoopCloser:
         if drift_px < self._options.min_drift_px:
             return None
         links = self._links(reconstruction)
-        correction = Correction(bridging.first_from_second, here.image_ids, old.image_ids)
+        correction = Correction(self._simplest(bridging), here.image_ids, old.image_ids)
         found = corrections(reconstruction, links, correction)
         if max(abs(found[i][0] - found[j][0]) for i, j in links) > self._options.max_step:
             return None
@@ -113,6 +114,17 @@ class LoopCloser:
             )
         )
         return closed
+
+    def _simplest(self, bridging: Bridging) -> pycolmap.Sim3d:
+        """A shift alone where it explains most of the matches: points that lie near to each other
+        hardly tell a turn and a scale, which would go all the way round."""
+        old, here = bridging.matches.xyz
+        shift = np.median(old - here, axis=0)
+        shifted = Similarities(np.ones(1), np.eye(3)[None], shift[None])
+        fits = bridging.matches.errors_px(shifted) < self._options.bridging.similarity.max_error_px
+        if fits.mean() < self._options.bridging.min_share:
+            return bridging.first_from_second
+        return shifted.only()
 
     def _open_neighbors(self, model: pycolmap.Reconstruction, image_id: int) -> list[int]:
         """Photos with pairs with this one whose keypoints lead to other points than its own."""
