@@ -105,29 +105,6 @@ class ModelsJoined:
 
 
 @dataclass(frozen=True, slots=True)
-class LoopClosed:
-    """A model came back to a place it holds, and its drift was spread over the way round.
-
-    ``bridges``: image ids of the photos on whose matches it rests; ``num_matches``: points that
-    they show to be the same; ``drift_px``: how far these lay apart in the photos, in the median.
-    """
-
-    model_id: int
-    num_registered: int
-    bridges: tuple[int, ...]
-    num_matches: int
-    drift_px: float
-    seconds: float
-
-    def __str__(self) -> str:
-        return (
-            f"model {self.model_id} of {self.num_registered} photos closed a loop: a drift of "
-            f"{self.drift_px:.0f} pixels at {len(self.bridges)} bridge photos, "
-            f"{self.num_matches} common points, {self.seconds:.2f} s"
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class RegisteredStructureLess:
     """Photos that see too few points were registered by two-view geometry."""
 
@@ -163,7 +140,6 @@ ModelEvent: TypeAlias = (
     | ModelDropped
     | ModelRefined
     | ModelsJoined
-    | LoopClosed
     | RegisteredStructureLess
     | LookedAgain
 )

@@ -1,4 +1,4 @@
-"""Whether a model that was put together holds: the last word on a join, and on a closed loop."""
+"""Whether a model that was put together holds: the last word on a join."""
 
 from __future__ import annotations
 

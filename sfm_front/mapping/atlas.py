@@ -20,7 +20,6 @@ from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.joining import Joiner, JoiningOptions
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
-from sfm_front.mapping.loop_closing import LoopCloser, LoopOptions
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.mapping.view_graph import ViewGraph
@@ -52,7 +51,6 @@ class AtlasOptions:
     mapper: MapperOptions = field(default_factory=MapperOptions)
     localization: LocalizationOptions = field(default_factory=LocalizationOptions)
     joining: JoiningOptions = field(default_factory=JoiningOptions)
-    loops: LoopOptions = field(default_factory=LoopOptions)
 
     def __post_init__(self) -> None:
         for name in ("min_second_model", "min_model_size"):
@@ -96,9 +94,6 @@ class Atlas:
             adjuster=adjuster,
         )
         self._joiner = Joiner(view_graph, self.options.joining, self.options.mapper, self.emit)
-        self._loops = LoopCloser(
-            view_graph, self.options.loops, self.emit, seed=self.options.mapper.seed
-        )
         self.models: list[Model] = []
 
     def restore(self, models: Iterable[tuple[pycolmap.Reconstruction, ModelState]]) -> None:
@@ -168,7 +163,6 @@ class Atlas:
         image_ids = sorted({i for pair in pairs for i in (pair.image_id1, pair.image_id2)})
         for model in self.models:
             model.take_pairs(image_ids)
-        self.models = [self._loops.close(model, image_ids) for model in self.models]
         self.grow()
         for image_id in image_ids:
             if image_id in self.waiting:
@@ -194,17 +188,15 @@ class Atlas:
         return {image_id: posed for image_id, posed in found.items() if posed is not None}
 
     def grow(self) -> bool:
-        """Join models that belong together, then grow each, the largest first, and close loops.
+        """Join models that belong together, then grow each, the largest first.
 
         True if any grew.
         """
         num_models = len(self.models)
         self.models = self._joiner.join(self.models)
         grew = len(self.models) < num_models
-        for number, model in enumerate(self.models):
-            placed = model.grow(self.candidates_of(model))
-            self.models[number] = self._loops.close(model, placed)
-            grew |= bool(placed)
+        for model in list(self.models):
+            grew |= bool(model.grow(self.candidates_of(model)))
         self.drop_covered()
         return grew
 
@@ -219,10 +211,8 @@ class Atlas:
         return not self.grow()
 
     def refine_until_stable(self) -> None:
-        """Close loops, grow and refine in turn until nothing more registers; what failed is
-        retried."""
+        """Grow and refine in turn until nothing more registers; what failed is retried."""
         self._forget_failures()
-        self.models = [self._loops.close(m, sorted(m.registered)) for m in self.models]
         while self.grow():
             for model in self.models:
                 model.refine()

@@ -14,7 +14,6 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``photo_waiting`` | it fits no model yet, and why |
 | ``model_started``, ``model_refined``, ``model_dropped`` | what became of a model |
 | ``models_joined`` | two became one: by which bridge photos, on how many common points |
-| ``loop_closed`` | a model came back to a known place, and its drift was spread |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
 | ``looked_again`` | a poorly connected photo was matched with more: ``found`` overlap |
 | ``session_ended`` | ``finished``: whether all models are written |
@@ -37,7 +36,6 @@ from sfm_front.errors import StorageError
 from sfm_front.events import (
     Event,
     LookedAgain,
-    LoopClosed,
     ModelDropped,
     ModelRefined,
     ModelsJoined,
@@ -69,7 +67,6 @@ _NAMES: dict[type, str] = {
     ModelRefined: "model_refined",
     ModelDropped: "model_dropped",
     ModelsJoined: "models_joined",
-    LoopClosed: "loop_closed",
     RegisteredStructureLess: "registered_structure_less",
     LookedAgain: "looked_again",
     SessionEnded: "session_ended",
