@@ -224,7 +224,7 @@ class Atlas:
         return not self.grow()
 
     def refine_until_stable(self) -> None:
-        """Grow and refine in turn until nothing more registers; failed photos are retried."""
+        """Grow and refine in turn until nothing more registers; what failed is retried."""
         self._forget_failures()
         while self.grow():
             for model in self.models:

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import time
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
-import numpy as np
-import pycolmap
-from numpy.typing import NDArray
-
 from sfm_front.errors import ConfigError
 from sfm_front.events import Emit, ModelsJoined
+from sfm_front.mapping.acceptance import AcceptanceOptions, is_sound
+from sfm_front.mapping.bridging import BridgingOptions, count_matches, find_bridging
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.merging import merged, with_cameras_of
 from sfm_front.mapping.model import Model
-from sfm_front.mapping.point_matches import PointMatches, Side, match_points
-from sfm_front.mapping.similarity_estimation import SimilarityOptions, estimate_similarity
+from sfm_front.mapping.point_matches import Side
 from sfm_front.mapping.view_graph import ViewGraph
 
 
@@ -28,30 +25,14 @@ class JoiningOptions:
 
     # Photos that a model must have beside those of the larger one it is joined to.
     min_photos: int = 3
-    # Common points that must agree on how the models lie to each other.
-    min_matches: int = 20
-    # Matches from which a bridge photo has a say, the share of them by which it agrees, and the
-    # share of such photos that must: one never decides against another.
-    min_bridge_matches: int = 8
-    min_share: float = 0.5
-    min_agreeing: float = 0.6
-    # Share of the observations of either model, and of the common points, that must be left when
-    # the joined model has been refined.
-    min_kept: float = 0.9
-    min_common: float = 0.5
     # A join that failed is tried again once there are this many times the bridge photos.
     retry_growth: float = 1.2
-    # Matches used per bridge photo.
-    sample: int = 200
-    similarity: SimilarityOptions = field(default_factory=SimilarityOptions)
+    bridging: BridgingOptions = field(default_factory=BridgingOptions)
+    acceptance: AcceptanceOptions = field(default_factory=AcceptanceOptions)
 
     def __post_init__(self) -> None:
-        for name in ("min_photos", "min_matches", "min_bridge_matches", "sample"):
-            if getattr(self, name) < 3:
-                raise ConfigError(f"{name} must be at least 3, got {getattr(self, name)}")
-        for name in ("min_share", "min_agreeing", "min_kept", "min_common"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ConfigError(f"{name} must be from 0 to 1, got {getattr(self, name)}")
+        if self.min_photos < 1:
+            raise ConfigError(f"min_photos must be at least 1, got {self.min_photos}")
         if self.retry_growth < 1:
             raise ConfigError(f"retry_growth must be at least 1, got {self.retry_growth}")
 
@@ -102,22 +83,22 @@ class Joiner:
     def _joined(self, first: Model, second: Model) -> Model | None:
         started = time.perf_counter()
         ours, theirs = first.reconstruction, second.reconstruction
-        if len(self._match(ours, theirs)) < self._options.min_matches:
+        options = self._options.bridging
+        sides = Side.all_of(ours), Side.all_of(theirs)
+        # Before a model is adjusted in vain.
+        if count_matches(self._view_graph, *sides, options, self._seed) < options.min_matches:
             return None
         theirs = with_cameras_of(theirs, ours, self._mapper_options)
-        matches = self._match(ours, theirs)
-        if len(matches) < self._options.min_matches:
+        sides = sides[0], Side.all_of(theirs)
+        bridging = find_bridging(self._view_graph, *sides, options, self._seed)
+        if bridging is None:
             return None
-        similarity, fits = estimate_similarity(
-            matches, self._options.similarity, self._mapper_options.seed
+        joined = first.succeeded_by(
+            merged(ours, theirs, bridging.first_from_second, bridging.same_points)
         )
-        inliers = matches.some(np.flatnonzero(fits))
-        if not self._is_agreed(matches, fits):
-            return None
-        reconstruction = merged(ours, theirs, similarity.only(), inliers.ids.tolist())
-        joined = first.succeeded_by(reconstruction)
         joined.refine_briefly()
-        if not self._is_sound(joined.reconstruction, ours, theirs, inliers):
+        parts = (ours, theirs)
+        if not is_sound(joined.reconstruction, parts, bridging.matches, self._options.acceptance):
             return None
         joined.emit = self._emit
         self._emit(
@@ -125,55 +106,12 @@ class Joiner:
                 first.model_id,
                 second.model_id,
                 (first.num_registered, second.num_registered),
-                tuple(np.unique(inliers.bridges).tolist()),
-                len(np.unique(inliers.ids, axis=0)),
+                bridging.bridges,
+                len(bridging.same_points),
                 time.perf_counter() - started,
             )
         )
         return joined
-
-    def _match(
-        self, ours: pycolmap.Reconstruction, theirs: pycolmap.Reconstruction
-    ) -> PointMatches:
-        sides = (Side(model, model.reg_image_ids()) for model in (ours, theirs))
-        return match_points(
-            self._view_graph, *sides, sample=self._options.sample, seed=self._mapper_options.seed
-        )
-
-    def _is_agreed(self, matches: PointMatches, fits: NDArray[np.bool_]) -> bool:
-        """Whether enough matches agree, and most of the bridge photos that have a say."""
-        options = self._options
-        if len(np.unique(matches.ids[fits], axis=0)) < options.min_matches:
-            return False
-        agreeing = [
-            fits[mine].mean() >= options.min_share
-            for bridge in np.unique(matches.bridges)
-            for mine in [matches.bridges == bridge]
-            if mine.sum() >= options.min_bridge_matches
-        ]
-        return bool(agreeing) and bool(np.mean(agreeing) >= options.min_agreeing)
-
-    def _is_sound(
-        self,
-        joined: pycolmap.Reconstruction,
-        ours: pycolmap.Reconstruction,
-        theirs: pycolmap.Reconstruction,
-        common: PointMatches,
-    ) -> bool:
-        """Whether refinement left the joined model what both had, and what they have in common."""
-        for model in (ours, theirs):
-            image_ids = model.reg_image_ids()
-            if not all(joined.image(i).has_pose for i in image_ids):
-                return False
-            kept = _num_observations(joined, image_ids) / _num_observations(model, image_ids)
-            if kept < self._options.min_kept:
-                return False
-        points = [
-            [_point_at(joined, *keypoint) for keypoint in of_side]
-            for of_side in common.keypoints.tolist()
-        ]
-        same = [one is not None and one == other for one, other in zip(*points, strict=True)]
-        return bool(np.mean(same) >= self._options.min_common)
 
 
 def _count_bridges(
@@ -197,12 +135,3 @@ def _count_bridges(
         touched = combinations(sorted(mine | reached), 2)
         bridges.update(pair for pair in touched if not mine or mine.intersection(pair))
     return bridges
-
-
-def _num_observations(model: pycolmap.Reconstruction, image_ids: Iterable[int]) -> int:
-    return sum(int(model.image(image_id).num_points3D) for image_id in image_ids)
-
-
-def _point_at(model: pycolmap.Reconstruction, image_id: int, index: int) -> int | None:
-    point = model.image(image_id).point2D(index)
-    return int(point.point3D_id) if point.has_point3D() else None

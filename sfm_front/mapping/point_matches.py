@@ -96,6 +96,11 @@ class Side:
         self.image_ids = frozenset(image_ids)
         self._points: dict[int, NDArray[np.int64]] = {}
 
+    @classmethod
+    def all_of(cls, model: pycolmap.Reconstruction) -> Side:
+        """All its photos."""
+        return cls(model, model.reg_image_ids())
+
     def points(self, image_id: int) -> NDArray[np.int64]:
         """(N,) point id of each keypoint of a photo, -1 where there is none."""
         if image_id not in self._points:

@@ -32,6 +32,8 @@ from sfm_front.types import PairGeometry
 NUM_PHOTOS = 16
 # The photos stand on a circle of 40 m; 0.5 px of noise are 15 mm on the surface they see.
 POSITION_TOLERANCE_M = 0.15
+# A ring is flown at 100 m; 0.5 px are 4 cm on the ground, and add up over 550 m.
+RING_TOLERANCE_M = 2.0
 OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
 
 
@@ -154,6 +156,23 @@ def test_models_that_come_to_connect_are_joined(orbit):
     assert dropped.reason is DropReason.COVERED
     assert str(dropped).startswith("model ")
     assert dropped.model_id not in {model.model_id for model in atlas.models}
+
+
+def test_a_round_trip_ends_where_it_began():
+    """Its last photos see what its first ones saw: the model is as true as the whole survey."""
+    ring = make_scene(40, 400, seed=5, layout="ring")
+    atlas = run(SceneFeed(ring), range(len(ring)))
+    finish(atlas)
+    assert [model.num_registered for model in atlas.models] == [len(ring)]
+    reconstruction = atlas.models[0].reconstruction
+    assert position_errors_m(reconstruction, ring).max() < RING_TOLERANCE_M
+    first = reconstruction.image(1)
+    shared = {
+        element.image_id
+        for index in first.get_observation_point2D_idxs()
+        for element in reconstruction.point3D(first.point2D(index).point3D_id).track.elements
+    }
+    assert shared & {len(ring) - 1, len(ring)}
 
 
 class TruckFeed(SceneFeed):

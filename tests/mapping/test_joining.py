@@ -14,7 +14,9 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
 from sfm_front.events import ModelEvent, ModelsJoined
 from sfm_front.geometry.similarity import Similarities
+from sfm_front.mapping.acceptance import AcceptanceOptions
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
+from sfm_front.mapping.bridging import BridgingOptions
 from sfm_front.mapping.bundle_adjustment import adjust_all
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.joining import JoiningOptions
@@ -24,8 +26,8 @@ from sfm_front.mapping.model import Model
 from sfm_front.mapping.similarity_estimation import SimilarityOptions
 from sfm_front.types import PairGeometry
 
-# Two flights of 12 photos each over hills, and three that see what both saw.
-FIRST, BRIDGES, SECOND = range(12), range(12, 15), range(15, 27)
+# Two flights of 12 photos each over hills, and four that see what both saw.
+FIRST, BRIDGES, SECOND = range(12), range(12, 16), range(16, 28)
 OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
 # The photos are taken from 100 m; 0.5 px of noise are 4 cm on the ground.
 POSITION_TOLERANCE_M = 1.0
@@ -33,7 +35,7 @@ POSITION_TOLERANCE_M = 1.0
 
 @pytest.fixture(scope="module")
 def flight() -> SyntheticScene:
-    return make_scene(27, 500, seed=4)
+    return make_scene(28, 500, seed=4)
 
 
 def are_linked(index: int, other: int) -> bool:
@@ -112,7 +114,7 @@ def test_one_photo_that_both_models_see_joins_them(flight):
     assert (join.model_id, join.joined_model_id) == (first.model_id, second.model_id)
     assert join.num_registered == (12, 12)
     assert join.bridges == (bridge,)
-    assert join.num_matches >= OPTIONS.joining.min_matches
+    assert join.num_matches >= OPTIONS.joining.bridging.min_matches
     assert str(join).startswith("model 2 of 12 photos joined to model 1 of 12: ")
     assert flights.atlas.models[0].model_id == first.model_id
     for index in BRIDGES[1:]:
@@ -166,11 +168,11 @@ def test_a_bridge_is_not_believed_where_another_contradicts(flight):
     models = flights.atlas.models
     true, _ = flights.add_waiting(BRIDGES[:2])
     assert flights.atlas._joiner.join(models) == models
-    # With a second one that says the same as the first it is.
-    also_true = flights.add(14)
-    flights.atlas.add(also_true)
+    # With two more that say the same as the first it is.
+    also_true = flights.add_waiting(BRIDGES[2:])
+    flights.atlas.grow()
     (join,) = flights.joins
-    assert {true, also_true} <= set(join.bridges)
+    assert {true, *also_true} <= set(join.bridges)
     assert [model.num_registered for model in flights.atlas.models] == [len(flight)]
 
 
@@ -215,20 +217,34 @@ def test_merging_keeps_what_both_have_where_the_first_has_it(flight):
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"min_photos": 1},
-        {"min_matches": 2},
-        {"min_bridge_matches": 0},
-        {"sample": 1},
-        {"min_share": 1.5},
-        {"min_agreeing": -0.1},
-        {"min_kept": 2},
-        {"min_common": -1},
+        {"min_photos": 0},
         {"retry_growth": 0.5},
     ],
 )
 def test_values_out_of_range_are_refused_by_name(wrong):
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         JoiningOptions(**wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"min_matches": 2},
+        {"min_bridge_matches": 0},
+        {"sample": 1},
+        {"min_share": 1.5},
+        {"min_agreeing": -0.1},
+    ],
+)
+def test_bridging_options_out_of_range_are_refused_by_name(wrong):
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        BridgingOptions(**wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"min_kept": 2}, {"min_common": -1}])
+def test_acceptance_options_out_of_range_are_refused_by_name(wrong):
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        AcceptanceOptions(**wrong)
 
 
 @pytest.mark.parametrize("wrong", [{"hypotheses": 0}, {"iterations": 0}, {"max_error_px": 0}])

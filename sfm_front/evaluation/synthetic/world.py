@@ -13,6 +13,9 @@ from sfm_front.types import Float64Array
 _ALTITUDE_M = 100.0
 _FORWARD_OVERLAP, _SIDE_OVERLAP = 0.75, 0.65
 _RING_OVERLAP = 0.85  # one line alone has no photos beside it to rely on
+# Standard deviation of the slope at which a photo looks down; a line of photos that all look down
+# alike does not tell how they roll.
+_TILT, _RING_TILT = 0.02, 0.15
 _HILLS_M = 6.0  # amplitude of each of the waves that make the hills
 _HILL_LENGTHS_M = (37.0, 61.0, 95.0, 170.0)
 _ORBIT_RADIUS_M, _BALL_RADIUS_M = 40.0, 12.0
@@ -111,7 +114,7 @@ def fly_strip(
     along = np.where(back, photos_a_line - 1 - place, place) * step
     centres = _in_wind(np.column_stack([along, line * spacing]), rng)
     courses = np.column_stack([np.where(back, -1.0, 1.0), np.zeros(num_images)])
-    poses = _looking_down(centres, courses, rng)
+    poses = _looking_down(centres, courses, _TILT, rng)
     reach = 0.75 * float(np.hypot(width, depth))
     low, high = centres[:, :2].min(axis=0) - reach, centres[:, :2].max(axis=0) + reach
     count = round(points_per_image * float(np.prod(high - low)) / (width * depth))
@@ -128,7 +131,7 @@ def fly_ring(
     angles = 2 * np.pi * np.arange(num_images) / num_images
     outward = np.column_stack([np.cos(angles), np.sin(angles)])
     courses = outward[:, ::-1] * (-1.0, 1.0)
-    poses = _looking_down(_in_wind(radius * outward, rng), courses, rng)
+    poses = _looking_down(_in_wind(radius * outward, rng), courses, _RING_TILT, rng)
     inner, outer = max(0.0, radius - reach), radius + reach
     count = round(points_per_image * np.pi * (outer**2 - inner**2) / (width * depth))
     away = np.sqrt(rng.uniform(inner**2, outer**2, count))
@@ -153,12 +156,14 @@ def _in_wind(route: Float64Array, rng: np.random.Generator) -> Float64Array:
 
 
 def _looking_down(
-    centres: Float64Array, courses: Float64Array, rng: np.random.Generator
+    centres: Float64Array, courses: Float64Array, slope: float, rng: np.random.Generator
 ) -> tuple[pycolmap.Rigid3d, ...]:
-    """Poses at ``centres`` (N, 3), the top of the picture towards ``courses`` (N, 2), roughly."""
+    """Poses at ``centres`` (N, 3), the top of the picture towards ``courses`` (N, 2), roughly.
+
+    ``slope``: standard deviation of how far they look aside, in altitudes."""
     poses = []
     for centre, (east, north) in zip(centres, courses, strict=True):
-        tilt = rng.normal(0.0, 0.02 * _ALTITUDE_M, 2)
+        tilt = rng.normal(0.0, slope * _ALTITUDE_M, 2)
         target = np.array([*(centre[:2] + tilt), 0.0])
         heading = np.array([east, north + 0.05 * rng.normal(), 0.0])
         poses.append(_look(centre, target, up=heading))
