@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from sfm_front.events import ModelEvent, ModelsJoined
 from sfm_front.geometry.similarity import Similarities
 from sfm_front.mapping.acceptance import AcceptanceOptions
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
+from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.bridging import BridgingOptions
 from sfm_front.mapping.bundle_adjustment import adjust_all
 from sfm_front.mapping.finishing import finish
@@ -31,6 +33,7 @@ FIRST, BRIDGES, SECOND = range(12), range(12, 16), range(16, 28)
 OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
 # The photos are taken from 100 m; 0.5 px of noise are 4 cm on the ground.
 POSITION_TOLERANCE_M = 1.0
+PATIENCE_S = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +49,16 @@ def are_linked(index: int, other: int) -> bool:
 class Flights(SceneFeed):
     """Both flights, in turn; the photos of ``lying`` match keypoints of the second at random."""
 
-    def __init__(self, scene: SyntheticScene, lying: Iterable[int] = ()) -> None:
+    def __init__(
+        self,
+        scene: SyntheticScene,
+        lying: Iterable[int] = (),
+        adjuster: BackgroundAdjuster | None = None,
+    ) -> None:
         super().__init__(scene, linked=are_linked)
         self._lying = set(lying)
         self.events: list[ModelEvent] = []
-        self.atlas = Atlas(self.scene, OPTIONS, self.events.append)
+        self.atlas = Atlas(self.scene, OPTIONS, self.events.append, adjuster)
         for pair in zip(FIRST, SECOND, strict=True):
             for index in pair:
                 self.atlas.add(self.add(index))
@@ -185,6 +193,28 @@ def test_a_join_that_ruins_the_models_is_undone(flight, monkeypatch):
     flights.add_waiting([12])
     assert flights.atlas._joiner.join(models) == models
     np.testing.assert_equal(flights.poses(), before)
+
+
+def test_a_refinement_begun_before_a_join_does_not_touch_the_joined_model(flight):
+    with BackgroundAdjuster() as adjuster:
+        flights = Flights(flight, adjuster=adjuster)
+        until = time.monotonic() + PATIENCE_S
+        while not adjuster.is_free and time.monotonic() < until:
+            adjuster.poll()
+        flights.atlas.settle()
+        flights.atlas.models[0].grow([])
+        flights.atlas.models[0]._refine_while_growing()
+        assert adjuster.is_busy
+        flights.atlas.add(flights.add(12))
+        assert len(flights.joins) == 1
+        while adjuster.is_busy and time.monotonic() < until:
+            adjuster.poll()
+        before = flights.poses()
+        flights.atlas.models[0].grow([])
+        np.testing.assert_equal(flights.poses(), before)
+        for index in BRIDGES[1:]:
+            flights.atlas.add(flights.add(index))
+        assert_whole(flights.atlas, flight)
 
 
 def test_merging_keeps_what_both_have_where_the_first_has_it(flight):
