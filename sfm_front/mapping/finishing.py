@@ -39,8 +39,12 @@ class _Finishing:
             self._start_remaining()
         self._fix_intrinsics()
         self._drop_small()
-        while self._register_structure_less():
+        self._register_loose()
+        if self._restart.misses_photos():
+            for model in self._atlas.models:
+                model.take_two_view_tracks()
             self._atlas.refine_until_stable()
+            self._register_loose()
         for model in self._atlas.models:
             model.finish()
         self._drop_without_pairs()
@@ -97,6 +101,10 @@ class _Finishing:
             if model.num_registered >= self._options.min_share * len(group):
                 break
         return best
+
+    def _register_loose(self) -> None:
+        while self._register_structure_less():
+            self._atlas.refine_until_stable()
 
     def _register_structure_less(self) -> bool:
         """Register photos that see too few points by two-view geometry; True if any was."""

@@ -147,7 +147,11 @@ class Initializer:
         return None
 
     def best_starts(self, per_level: int) -> Iterator[Model]:
-        """Models of two photos from the pairs that COLMAP finds best in the whole view graph."""
+        """Models of two photos from the pairs that COLMAP finds best in the whole view graph.
+
+        A pair begins one model at most.
+        """
+        tried: set[tuple[int, int]] = set()
         for level in self._options.constraint_levels:
             if level.min_waiting is None:
                 break
@@ -155,10 +159,15 @@ class Initializer:
             if all(self._is_too_narrow(pair, level) for pair in pairs):
                 continue  # COLMAP would estimate every one of them to find none.
             finder = Model(self._view_graph, self._mapper_options)
-            for _ in range(per_level):
+            num_new = 0
+            while num_new < per_level:
                 pair = finder.find_initial_pair(level.constraints)
                 if pair is None:
                     break
+                if pair in tried:
+                    continue
+                tried.add(pair)
+                num_new += 1
                 model = self._start_from(pair, level.constraints, StartKind.RESTART)
                 if model is not None:
                     yield model

@@ -143,6 +143,18 @@ class Model:
             self._mapper.triangulate_image(self._triangulation, image_id)
         self.forget_failures()
 
+    def take_two_view_tracks(self) -> None:
+        """Triangulate points that two photos alone show, too, from now on.
+
+        COLMAP leaves them out: nothing checks them. Where photos stand far apart there are hardly
+        any others to register a further one by.
+        """
+        self._triangulation.ignore_two_view_tracks = False
+        self._begin_anew()
+        for image_id in sorted(self.registered):
+            self._mapper.triangulate_image(self._triangulation, image_id)
+        self.forget_failures()
+
     def initialize(
         self, image_id1: int, image_id2: int, constraints: InitialPairConstraints
     ) -> bool:

@@ -36,7 +36,7 @@ class Restart:
             )
         if self._fresh is None:
             most = max(atlas.options.max_failures, self._num_affordable)
-            if self._failures >= most or not self._misses_photos():
+            if self._failures >= most or not self.misses_photos():
                 return False
             self._fresh = next(self._starts, None)
             if self._fresh is None:
@@ -59,17 +59,23 @@ class Restart:
             atlas.refine_until_stable()
             return
         atlas.announce_drop(fresh, DropReason.NO_BETTER)
-        if 2 * fresh.num_registered > best:
+        far = len(self._linked()) if self._num_affordable else best
+        if 2 * fresh.num_registered > far:
             # It grew far and still registered no more: another start hardly will.
             self._failures += 1
 
-    def _misses_photos(self) -> bool:
+    def _linked(self) -> set[int]:
+        """Photos that chains of pairs link to the largest model, its own included."""
+        models = self._atlas.models
+        return self._atlas.view_graph.component(models[0].registered) if models else set()
+
+    def misses_photos(self) -> bool:
         """Whether photos linked to the largest model are in none, or too many in others."""
         atlas = self._atlas
         if not atlas.models:
             return True
         registered = atlas.models[0].registered
-        linked = atlas.view_graph.component(registered)
+        linked = self._linked()
         missed = linked - atlas.registered
         if not self._num_affordable:
             # By fewer pairs, no other start would hold them either.
