@@ -31,7 +31,7 @@ class FoldOptions:
 
     # Cells, a 24th of the long side each, in which a photo of either part misses what the other
     # part sees there, on average, and their share of those in which it sees the same
-    # (TUNING: fold-cells, fold-share). Few cells tell little; a small share may be something that
+    # (TUNING: fold). Few cells tell little; a small share may be something that
     # was moved between two visits.
     min_cells: float = 7.0
     min_share: float = 0.08
