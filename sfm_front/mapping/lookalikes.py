@@ -87,23 +87,23 @@ class _Comparison:
         self._bounds: dict[tuple[int, int], IndexArray] = {}
 
     def conflict(self, beyond: BoolArray) -> float:
-        """Share of what the photos ``beyond`` (N,) and the others should both see that one misses,
-        of the part that misses less; 0 if it is not enough to tell."""
+        """Cells in which the photos ``beyond`` (N,) or the others miss what both should see, of the
+        part that misses less; 0 if it is not enough to tell."""
         pairs = self._pairs(beyond)
         # Comparing each pair by itself finds no less to miss and no more that is shared, and can be
         # remembered: it does for most parts of a model that is not folded.
-        if self._share([self._bound(pair) for pair in pairs]) == 0:
+        if self._missing([self._bound(pair) for pair in pairs]) == 0:
             return 0.0
         seen = [self.covisibility.seen_by(part) for part in (beyond, ~beyond)]
-        return self._share([self._compare(pair, seen[1], seen[0]) for pair in pairs])
+        return self._missing([self._compare(pair, seen[1], seen[0]) for pair in pairs])
 
-    def _share(self, cells: list[IndexArray]) -> float:
+    def _missing(self, cells: list[IndexArray]) -> float:
         """``cells``: for each pair what ``_cells`` counts."""
         missing, same = np.sum(cells, axis=0) if cells else np.zeros((2, 2))
         if missing.min() < max(1, self._options.min_cells * len(cells)):
             return 0.0
-        share = float((missing / (missing + same)).min())
-        return share if share >= self._options.min_share else 0.0
+        share = (missing / (missing + same)).min()
+        return float(missing.min()) if share >= self._options.min_share else 0.0
 
     def _pairs(self, beyond: BoolArray) -> list[tuple[int, int]]:
         """The pairs to compare, the first photo of each ``beyond``."""
