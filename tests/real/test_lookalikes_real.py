@@ -23,10 +23,9 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("order", [("name",), ("random", "--seed", "1")], ids=["name", "random"])
-def test_no_points_are_seen_at_both_cans(order, tmp_path):
+def test_no_points_are_seen_at_both_cans(tmp_path):
     output = tmp_path / "out"
-    arguments = ["--order", *order, "--global-descriptor", "vlad", "--threads", "1"]
+    arguments = ["--order", "random", "--seed", "1", "--global-descriptor", "vlad"]
     assert main(["reconstruct", str(SCENE), "--output", str(output), *arguments]) == 0
     models = [read_model(folder) for folder in sorted((output / "sparse").glob("[0-9]*"))]
     registered = set().union(*(numbers(model).values() for model in models))
