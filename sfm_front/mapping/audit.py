@@ -22,7 +22,8 @@ from sfm_front.types import Float64Array, Uint32Array
 # Pixels that a match of a pair may be off the epipolar line: twice what verification allows, for
 # the poses have an error too.
 _MAX_ERROR_PX = 8.0
-# Share of a pair's matches from which it agrees with the model, and up to which it contradicts it.
+# Share of a pair's matches from which it agrees with the model, and up to which it contradicts it
+# (TUNING: contradicted).
 _AGREES = 0.5
 _CONTRADICTS = 0.25
 # Share of a model's matches in pairs that contradict it from which a user should look at it.

@@ -1,12 +1,15 @@
 """Whether a model is folded: things that look alike were taken for one, and stand in one place.
 
 Where they do, their surroundings contradict each other. Photos of the one and photos of the other
-see the look-alike itself together, and beside it, in the same place, different things.
+see the look-alike itself together, but each sees things beside it that the other should see, and
+does not.
 
 The test is that of Heinly, Dunn and Frahm, "Correcting for Duplicate Scene Structure in Sparse 3D
-Reconstruction", ECCV 2014, with cells of a grid in place of segments: the photos are parted at each
-edge of a spanning tree, and the parts are compared. A point that a photo happens to miss does not
-count: nobody in the other part may have seen it.
+Reconstruction", ECCV 2014: the photos are parted at each edge of a spanning tree, and the parts are
+compared. A point that a photo happens to miss does not count: nobody in the whole other part may
+have seen it. What is counted are missing correspondences as in Zach, Irschara and Bischof, "What
+Can Missing Correspondences Tell Us About 3D Structure and Motion?", CVPR 2008, by area; both parts
+must miss some, for one alone may be out of focus, or behind something.
 """
 
 from __future__ import annotations
@@ -26,11 +29,12 @@ from sfm_front.mapping.photo_grid import cells_of, occupied, widened
 class FoldOptions:
     """What tells a folded model."""
 
-    # Cells, a 24th of the long side each, in which two photos of a folded model see different
-    # things, on average, and their share of all cells that both see (TUNING: fold-conflict). Few
-    # cells tell little; a small share may be something that was moved between two visits.
-    min_cells: float = 5.0
-    min_share: float = 0.05
+    # Cells, a 24th of the long side each, in which a photo of either part misses what the other
+    # part sees there, on average, and their share of those in which it sees the same
+    # (TUNING: fold). Few cells tell little; a small share may be something that
+    # was moved between two visits.
+    min_cells: float = 7.0
+    min_share: float = 0.08
     # Observations of the points that count. Passers-by and wrong matches have fewer.
     min_observers: int = 3
     # Two photos are compared if they share this many points, and see them from directions that
@@ -80,28 +84,26 @@ class _Comparison:
         ]
         self._centers = np.array([posed.center for posed in self._posed])
         self._angles_deg: dict[tuple[int, int], float] = {}
-        self._bounds: dict[tuple[int, int], tuple[int, int]] = {}
+        self._bounds: dict[tuple[int, int], IndexArray] = {}
 
     def conflict(self, beyond: BoolArray) -> float:
-        """Share of what the photos ``beyond`` (N,) and the others see in which they differ; 0 if
-        it is not enough to tell."""
+        """Cells in which the photos ``beyond`` (N,) or the others miss what both should see, of the
+        part that misses less; 0 if it is not enough to tell."""
         pairs = self._pairs(beyond)
-        # Comparing each pair by itself finds no less to differ and no more to agree, and can be
+        # Comparing each pair by itself finds no less to miss and no more that is shared, and can be
         # remembered: it does for most parts of a model that is not folded.
-        if self._share([self._bound(pair) for pair in pairs]) == 0:
+        if self._missing([self._bound(pair) for pair in pairs]) == 0:
             return 0.0
         seen = [self.covisibility.seen_by(part) for part in (beyond, ~beyond)]
-        return self._share([self._compare(pair, seen[1], seen[0]) for pair in pairs])
+        return self._missing([self._compare(pair, seen[1], seen[0]) for pair in pairs])
 
-    def _share(self, counts: list[tuple[int, int]]) -> float:
-        """Of the cells that differ among all; 0 if they are too few or too small a share."""
-        different, same = (
-            (sum(column) for column in zip(*counts, strict=True)) if counts else (0, 0)
-        )
-        if different < self._options.min_cells * len(counts):
+    def _missing(self, cells: list[IndexArray]) -> float:
+        """``cells``: for each pair what ``_cells`` counts."""
+        missing, same = np.sum(cells, axis=0) if cells else np.zeros((2, 2))
+        if missing.min() < max(1, self._options.min_cells * len(cells)):
             return 0.0
-        share = different / max(1, different + same)
-        return share if share >= self._options.min_share else 0.0
+        share = (missing / (missing + same)).min()
+        return float(missing.min()) if share >= self._options.min_share else 0.0
 
     def _pairs(self, beyond: BoolArray) -> list[tuple[int, int]]:
         """The pairs to compare, the first photo of each ``beyond``."""
@@ -131,48 +133,39 @@ class _Comparison:
             self._angles_deg[key] = angle
         return self._angles_deg[key]
 
-    def _bound(self, pair: tuple[int, int]) -> tuple[int, int]:
-        """At least as many cells that differ, and no more that agree, than in any two parts."""
-        key = min(pair), max(pair)
-        if key not in self._bounds:
-            first, second = (self.covisibility.observed[photo] for photo in key)
+    def _bound(self, pair: tuple[int, int]) -> IndexArray:
+        """At least as many cells in which things are missing, and no more that are the same, than
+        in any two parts."""
+        if pair not in self._bounds:
+            first, second = (self.covisibility.observed[photo] for photo in pair)
             shared = np.intersect1d(first, second, assume_unique=True)
             unique = np.setdiff1d(first, shared, True), np.setdiff1d(second, shared, True)
-            self._bounds[key] = self._fewest(key, unique, shared)
-        return self._bounds[key]
+            self._bounds[pair] = self._cells(pair, unique, shared)
+            self._bounds[pair[::-1]] = self._bounds[pair][:, ::-1]
+        return self._bounds[pair]
 
     def _compare(
         self, pair: tuple[int, int], seen_by_others: BoolArray, seen_by_own: BoolArray
-    ) -> tuple[int, int]:
-        """Cells in which two photos show different things, and those in which they show the same.
-
-        ``seen_by_others`` (P,): points that the part of the second photo observes, ``seen_by_own``
-        those that the part of the first does.
-        """
+    ) -> IndexArray:
+        """``seen_by_others`` (P,): points that the part of the second photo observes;
+        ``seen_by_own``: those that the part of the first does."""
         first, second = (self.covisibility.observed[photo] for photo in pair)
         unique = first[~seen_by_others[first]], second[~seen_by_own[second]]
         shared = np.union1d(first[seen_by_others[first]], second[seen_by_own[second]])
-        return self._fewest(pair, unique, shared)
+        return self._cells(pair, unique, shared)
 
-    def _fewest(
+    def _cells(
         self, pair: tuple[int, int], unique: tuple[IndexArray, IndexArray], shared: IndexArray
-    ) -> tuple[int, int]:
-        """Of the two photos the cells of the one with fewer differences."""
-        first = self._differences(pair[0], unique, shared)
-        return min(first, self._differences(pair[1], unique, shared)) if first[0] else first
-
-    def _differences(
-        self, photo: int, unique: tuple[IndexArray, IndexArray], shared: IndexArray
-    ) -> tuple[int, int]:
-        """Of one photo: cells with unique points of both sides and no shared ones near, and cells
-        with shared points. Points count where they would lie, visible or hidden."""
-        posed = self._posed[photo]
-        pixels = posed.project(self.covisibility.points[np.concatenate([*unique, shared])])
-        cells = cells_of(pixels, posed.camera)
-        start, end = len(unique[0]), len(unique[0]) + len(unique[1])
-        ours, theirs, same = (
-            occupied(part) for part in (cells[:start], cells[start:end], cells[end:])
-        )
-        either = (ours & widened(theirs)) | (widened(ours) & theirs)
-        different = either & ~widened(same)
-        return int(np.count_nonzero(different)), int(np.count_nonzero(same))
+    ) -> IndexArray:
+        """(2, 2) cells in which the first photo and the second miss unique points of the other,
+        with no shared ones near; and cells with shared points."""
+        counts = []
+        for photo, theirs in zip(pair, unique[::-1], strict=True):
+            posed = self._posed[photo]
+            pixels = posed.project(self.covisibility.points[np.concatenate([theirs, shared])])
+            cells = cells_of(pixels, posed.camera)
+            missing, same = occupied(cells[: len(theirs)]), occupied(cells[len(theirs) :])
+            missing &= ~widened(same)
+            counts.append((np.count_nonzero(missing), np.count_nonzero(same)))
+        missing_and_same: IndexArray = np.array(counts, np.int64).T
+        return missing_and_same
