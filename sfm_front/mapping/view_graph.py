@@ -24,6 +24,7 @@ class ViewGraph:
         self._cache = pycolmap.DatabaseCache()
         self._neighbors: dict[int, dict[int, int]] = {}
         self._angles_rad: dict[tuple[int, int], float] = {}
+        self._reduced: dict[tuple[int, int], Uint32Array] = {}
 
     def add(
         self,
@@ -124,6 +125,7 @@ class ViewGraph:
             if len(matches) == 0:
                 del self._neighbors[first][second], self._neighbors[second][first]
                 del self._angles_rad[first, second]
+        self._reduced.update(kept)
         # pycolmap cannot take anything out.
         old, self._cache = self._cache, pycolmap.DatabaseCache()
         for camera in old.cameras.values():
@@ -137,6 +139,11 @@ class ViewGraph:
             if pair in kept:
                 geometry.inlier_matches = kept[pair]
             self._cache.correspondence_graph.add_two_view_geometry(*pair, geometry)
+
+    def pop_reduced(self) -> dict[tuple[int, int], Uint32Array]:
+        """What ``keep_only`` has left of pairs since the last call."""
+        reduced, self._reduced = self._reduced, {}
+        return reduced
 
     def component(self, start: Iterable[int], *, among: Collection[int] | None = None) -> set[int]:
         """Photos linked to the given ones by chains of verified pairs, these included.

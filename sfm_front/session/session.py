@@ -275,6 +275,8 @@ class Session(Closeable):
         atlas = self._parts.atlas
         before = atlas.registered
         result = act()
+        if refused := atlas.view_graph.pop_reduced():
+            self.database.keep_matches(refused)
         for image_id in sorted(atlas.registered - before):
             self._announcer.tell_placed(atlas, image_id)
         return result

@@ -74,6 +74,12 @@ def photo_rows(image_id: int, photo: ExtractedPhoto, camera_id: int) -> Iterator
         yield _prior_row(image_id, camera_id, position, position.altitude_m)
 
 
+def inlier_data(image_id1: int, image_id2: int, matches: Uint32Array) -> bytes:
+    """Inliers (M, 2) of a pair as ``pair_rows`` writes them, the photo of lower id first."""
+    ordered = matches if image_id1 < image_id2 else matches[:, ::-1]
+    return _blob(ordered, np.uint32)
+
+
 def pair_rows(pair: PairGeometry) -> Iterator[Row]:
     """Tentative matches and two-view geometry, the photo of lower id first."""
     matches, geometry = pair.matches, pair.two_view_geometry

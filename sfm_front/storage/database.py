@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,6 +16,7 @@ from sfm_front.storage.atomic import write_atomically
 from sfm_front.storage.colmap_rows import (
     PAIR_COLUMNS,
     camera_rows,
+    inlier_data,
     pair_rows,
     photo_rows,
     read_camera,
@@ -42,6 +43,7 @@ from sfm_front.types import (
     Skipped,
     StoredPhoto,
     Uint8Array,
+    Uint32Array,
 )
 
 DATABASE = "database.db"
@@ -93,6 +95,23 @@ class PhotoDatabase(Closeable):
         """Write pairs of photos that are there, found later: all of them, or none."""
         with self._file.transaction():
             self._insert_pairs(pairs)
+
+    def keep_matches(self, kept: Mapping[tuple[int, int], Uint32Array]) -> None:
+        """Leave verified pairs, named by later and earlier photo, only these (M, 2) of their
+        inliers. A pair without any is verified no longer; its tentative matches stay."""
+        with self._file.transaction():
+            for (later, earlier), matches in kept.items():
+                pair_id = pycolmap.image_pair_to_pair_id(later, earlier)
+                if len(matches):
+                    self._file.execute(
+                        "UPDATE two_view_geometries SET rows = ?, data = ? WHERE pair_id = ?",
+                        (len(matches), inlier_data(later, earlier, matches), pair_id),
+                    )
+                    continue
+                self._file.execute("DELETE FROM two_view_geometries WHERE pair_id = ?", (pair_id,))
+                self._file.execute(
+                    "DELETE FROM sfm_front_pairs WHERE later = ? AND earlier = ?", (later, earlier)
+                )
 
     def _insert_pairs(self, pairs: Sequence[PairGeometry]) -> None:
         for pair in pairs:

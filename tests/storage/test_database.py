@@ -159,6 +159,26 @@ def test_pairs_may_come_after_their_photos(orbit, tmp_path):
     np.testing.assert_array_equal(read.inlier_matches, pairs[1].matches)
 
 
+def test_pairs_may_lose_matches_that_were_refused(orbit, tmp_path):
+    file = tmp_path / "database.db"
+    first, second = (true_pair(orbit, 2, other, (3, other + 1)) for other in (0, 1))
+    left = second.two_view_geometry.inlier_matches[::2]
+    with PhotoDatabase(file) as database:
+        for image_id in (1, 2):
+            database.write(image_id, described(orbit, image_id - 1), orbit.camera, [])
+        database.write(3, described(orbit, 2), orbit.camera, [first, second])
+        database.keep_matches({(3, 1): left[:0], (3, 2): left})
+        (pair,) = database.pairs(3)
+        assert pair.image_id2 == 2
+        np.testing.assert_array_equal(pair.two_view_geometry.inlier_matches, left)
+        np.testing.assert_array_equal(pair.matches, second.matches)
+    with pycolmap.Database.open(file) as opened:
+        assert not opened.exists_two_view_geometry(3, 1)
+        read = opened.read_two_view_geometry(3, 2)
+        np.testing.assert_array_equal(read.inlier_matches, left)
+        np.testing.assert_allclose(read.E, second.two_view_geometry.E, atol=ROTATION_TOLERANCE)
+
+
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
 def test_a_write_that_fails_leaves_nothing_of_the_photo(orbit, tmp_path, error):
     file = tmp_path / "database.db"
