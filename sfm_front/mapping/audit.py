@@ -28,6 +28,8 @@ _AGREES = 0.5
 _CONTRADICTS = 0.25
 # Share of a model's matches in pairs that contradict it from which a user should look at it.
 _DOUBTFUL = 0.01
+# Matches of a pair by which an audit judges it, evenly chosen.
+_SAMPLE = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,31 +64,32 @@ def audit(
 
     ``largest_part``: the smaller of the worst parts is to have no more photos than this.
     """
-    covisibility = Covisibility.of(reconstruction, min_observers=2)
-    image_ids = covisibility.image_ids
-    pairs = view_graph.pairs(image_ids.tolist())
+    pairs = view_graph.pairs(reconstruction.reg_image_ids())
     found = [
-        (len(matches), agrees.mean())
-        for _, matches, agrees in agreeing(reconstruction, view_graph, pairs)
+        (view_graph.neighbors(pair[0])[pair[1]], agrees.mean())
+        for pair, _, agrees in agreeing(reconstruction, view_graph, pairs, at_most=_SAMPLE)
     ]
     num_matches, shares = np.array(found, np.float64).reshape(-1, 2).T
     against = np.where(shares <= _CONTRADICTS, num_matches, 0)
     speaking = against + np.where(shares >= _AGREES, num_matches, 0)
-    ends = np.searchsorted(image_ids, np.array(pairs, np.int64).reshape(-1, 2))
     worst, worst_share = None, 0.0
-    for beyond in halves(covisibility.num_shared()):
-        size = np.count_nonzero(beyond)
-        if largest_part is not None and min(size, len(beyond) - size) > largest_part:
-            continue
-        crossing = beyond[ends[:, 0]] != beyond[ends[:, 1]]
-        share = against[crossing].sum() / max(1, speaking[crossing].sum())
-        if share > worst_share:
-            worst, worst_share = beyond, float(share)
+    if against.any():
+        covisibility = Covisibility.of(reconstruction, min_observers=2)
+        image_ids = covisibility.image_ids
+        ends = np.searchsorted(image_ids, np.array(pairs, np.int64))
+        for beyond in halves(covisibility.num_shared()):
+            size = int(np.count_nonzero(beyond))
+            if largest_part is not None and min(size, len(beyond) - size) > largest_part:
+                continue
+            crossing = beyond[ends[:, 0]] != beyond[ends[:, 1]]
+            share = float(against[crossing].sum() / max(1, speaking[crossing].sum()))
+            if share > worst_share:
+                worst, worst_share = parts(image_ids, beyond), share
     return ModelAudit(
         num_pairs=len(pairs),
         num_contradicted=int(np.count_nonzero(against)),
         contradicted_share=float(against.sum() / max(1, num_matches.sum())),
-        worst_parts=None if worst is None else parts(image_ids, worst),
+        worst_parts=worst,
         worst_share=worst_share,
     )
 
@@ -95,28 +98,24 @@ def agreeing(
     reconstruction: pycolmap.Reconstruction,
     view_graph: ViewGraph,
     pairs: Iterable[tuple[int, int]],
+    *,
+    at_most: int | None = None,
 ) -> Iterator[tuple[tuple[int, int], Uint32Array, BoolArray]]:
     """Verified pairs of registered photos, their matches (M, 2), and which of these (M,) lie where
-    the poses of the model put them."""
-    rays: dict[int, Float64Array] = {}
+    the poses of the model put them; or no more than ``at_most`` of the matches of each."""
     for pair in pairs:
-        posed = []
-        for image_id in pair:
+        matches = view_graph.matches(*pair)
+        if at_most is not None:
+            matches = matches[:: -(-len(matches) // at_most)]
+        posed: list[PosedCamera] = []
+        rays: list[Float64Array] = []
+        for image_id, indices in zip(pair, matches.T, strict=True):
             image = reconstruction.image(image_id)
             camera = reconstruction.camera(image.camera_id)
             posed.append(PosedCamera(camera, image.cam_from_world()))
-            if image_id not in rays:
-                pixels = np.array([point.xy for point in image.points2D], np.float64)
-                rays[image_id] = undistorted_rays(camera, pixels)
+            pixels = np.array([image.point2D(index).xy for index in indices.tolist()], np.float64)
+            rays.append(undistorted_rays(camera, pixels))
         focal_px = 0.5 * sum(one.camera.mean_focal_length() for one in posed)
-        matches = view_graph.matches(*pair)
-        yield (
-            pair,
-            matches,
-            fits_epipolar(
-                pycolmap.essential_matrix_from_pose(posed[0].relative(posed[1])),
-                rays[pair[0]][matches[:, 0]],
-                rays[pair[1]][matches[:, 1]],
-                _MAX_ERROR_PX / focal_px,
-            ),
-        )
+        essential = pycolmap.essential_matrix_from_pose(posed[0].relative(posed[1]))
+        first, second = rays
+        yield pair, matches, fits_epipolar(essential, first, second, _MAX_ERROR_PX / focal_px)

@@ -39,7 +39,7 @@ class SecondLookOptions:
     # Nearest photos that a photo is matched with while nothing arrives, or if all pairs may be.
     candidates: int = 24
     # The same while others wait, and at the end.
-    hurried_candidates: int = 4
+    hurried_candidates: int = 3
     # A photo that waits is looked at after so many others: they may place it for nothing.
     patience: int = 5
     # Verified pairs within its model that a registered photo needs to count as well connected.
