@@ -14,14 +14,6 @@ _MAX_AGREEING = 0.5
 _MIN_MATCHES = 15
 
 
-def settle(atlas: Atlas) -> bool:
-    """Refine all models, register what fits them then, and take apart those that are folded.
-
-    False if that is not yet done, see ``Atlas.settle``.
-    """
-    return atlas.settle() and not unfold(atlas)
-
-
 def unfold(atlas: Atlas) -> bool:
     """Take folded models apart, and grow the parts by the matches that remain; True if any was.
 

@@ -22,7 +22,7 @@ from sfm_front.events import (
 from sfm_front.features.global_descriptors.descriptor import resolve
 from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
-from sfm_front.mapping.unfolding import settle
+from sfm_front.mapping.unfolding import unfold
 from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.report_json import write_report
 from sfm_front.reports.retrieval_log import RetrievalLog
@@ -184,9 +184,11 @@ class Session(Closeable):
         """Do what is next; True if nothing is left to be done."""
         parts = self._parts
         return (
-            settle(parts.atlas)
+            parts.atlas.settle()
             and not parts.second_look.while_idle()
             and not parts.restart.go_on(_PHOTOS_AT_A_TIME)
+            # Last, for it looks at all that there is each time.
+            and not unfold(parts.atlas)
         )
 
     @property

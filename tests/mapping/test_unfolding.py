@@ -14,7 +14,7 @@ from sfm_front.mapping.audit import agreeing, audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import ModelState
-from sfm_front.mapping.unfolding import settle, unfold
+from sfm_front.mapping.unfolding import unfold
 
 OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
 
@@ -63,10 +63,10 @@ def test_a_folded_model_is_taken_apart_and_joined_by_true_matches():
 def test_a_session_that_waits_takes_a_folded_model_apart():
     walk = LookAlikeWalk()
     atlas = atlas_of(walk, lambda _: None, folded=True)
-    answers = [settle(atlas)]
-    while not answers[-1]:
-        answers.append(settle(atlas))
-    assert len(answers) > 1
+    while not atlas.settle():
+        pass
+    assert unfold(atlas)
+    assert atlas.settle() and not unfold(atlas)
     assert_true(atlas, walk)
 
 
