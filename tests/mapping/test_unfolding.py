@@ -66,7 +66,8 @@ def test_a_session_that_waits_takes_a_folded_model_apart():
     while not atlas.settle():
         pass
     assert unfold(atlas)
-    assert atlas.settle() and not unfold(atlas)
+    assert atlas.settle()
+    assert not unfold(atlas)
     assert_true(atlas, walk)
 
 
