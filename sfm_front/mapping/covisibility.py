@@ -44,9 +44,9 @@ class Covisibility:
                 np.unique(
                     np.array(
                         [
-                            index_of[point.point3D_id]
+                            index
                             for point in reconstruction.image(i).get_observation_points2D()
-                            if point.point3D_id in index_of
+                            if (index := index_of.get(point.point3D_id)) is not None
                         ],
                         np.int64,
                     )

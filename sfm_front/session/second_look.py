@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import groupby
-from operator import itemgetter
+
+import numpy as np
 
 from sfm_front.errors import ConfigError
 from sfm_front.events import LookedAgain, ModelEvent
@@ -25,9 +24,6 @@ from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import PairGeometry, Rejected, Uint32Array, View
 
-Pair = tuple[int, int]
-"""Image ids, that of the later photo first."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class SecondLookOptions:
@@ -39,7 +35,7 @@ class SecondLookOptions:
     # Nearest photos that a photo is matched with while nothing arrives, or if all pairs may be.
     candidates: int = 24
     # The same while others wait, and at the end.
-    hurried_candidates: int = 3
+    hurried_candidates: int = 2
     # A photo that waits is looked at after so many others: they may place it for nothing.
     patience: int = 5
     # Verified pairs within its model that a registered photo needs to count as well connected.
@@ -88,7 +84,7 @@ class SecondLook:
         self._looked_in: dict[int, tuple[int, int]] = {}
 
     def note(self, image_id: int, others: Iterable[int]) -> None:
-        """These earlier photos were matched with this one on all features."""
+        """These other photos were matched with this one on all features."""
         for other in others:
             self._known[image_id].add(other)
             self._known[other].add(image_id)
@@ -124,27 +120,26 @@ class SecondLook:
         if self._looked_in.get(image_id) == circumstances:
             return False
         self._looked_in[image_id] = circumstances
-        chosen = self._chosen(image_id, num_candidates)
-        if not chosen:
+        others = self._chosen(image_id, num_candidates)
+        if not others:
             return False
-        pairs = self._matched(chosen)
+        pairs = self._matched(image_id, others)
         if pairs:
             self._database.write_pairs(pairs)
             self._atlas.take_pairs(pairs)
         found = (i for pair in pairs for i in (pair.image_id1, pair.image_id2) if i != image_id)
-        self._emit(LookedAgain(image_id, tuple(found), len(chosen), self.budget))
+        self._emit(LookedAgain(image_id, tuple(found), len(others), self.budget))
         return True
 
-    def _chosen(self, image_id: int, num_candidates: int) -> list[Pair]:
-        """The photo with the nearest of those that it may overlap with."""
+    def _chosen(self, image_id: int, num_candidates: int) -> list[int]:
+        """The nearest of those that the photo may overlap with."""
         nearest = self._retriever.nearest(
             image_id,
             num_candidates,
             without=self._known[image_id] | self._companions(image_id),
             expand_with=self._atlas.view_graph.neighbors(image_id),
         )
-        pairs = [(max(image_id, other), min(image_id, other)) for other in nearest]
-        return pairs[: max(0, self.budget)]
+        return nearest[: max(0, self.budget)]
 
     def _companions(self, image_id: int) -> set[int]:
         """Photos it stands well connected with: further pairs with these would add nothing."""
@@ -175,21 +170,21 @@ class SecondLook:
         pairs = self._atlas.view_graph.neighbors(image_id).keys() & photos
         return len(pairs) < self._options.min_pairs
 
-    def _matched(self, pairs: Sequence[Pair]) -> list[PairGeometry]:
-        """Those that overlap, by all features."""
-        self._num_matched += len(pairs)
-        verified: list[PairGeometry] = []
-        for later_id, group in groupby(sorted(pairs), key=itemgetter(0)):
-            later, others = self._catalog[later_id], [self._catalog[i] for _, i in group]
-            matches = self._matcher.match(
-                later.features, [other.features for other in others], [None] * len(others)
-            )
-            verdicts = self._workers.map(
-                partial(self._verify, later), zip(others, matches, strict=True)
-            )
-            verified += [pair for pair in verdicts if isinstance(pair, PairGeometry)]
-            self.note(later_id, (other.image_id for other in others))
-        return verified
+    def _matched(self, image_id: int, other_ids: Sequence[int]) -> list[PairGeometry]:
+        """Pairs of a photo with those that overlap with it, by all features."""
+        self._num_matched += len(other_ids)
+        self.note(image_id, other_ids)
+        view, others = self._catalog[image_id], [self._catalog[i] for i in other_ids]
+        matches = self._matcher.match(
+            view.features, [other.features for other in others], [None] * len(others)
+        )
 
-    def _verify(self, later: View, found: tuple[View, Uint32Array]) -> PairGeometry | Rejected:
-        return self._verifier.verify(later, *found)
+        def verify(found: tuple[View, Uint32Array]) -> PairGeometry | Rejected:
+            other, of_both = found
+            # The later photo stands first in a pair.
+            if other.image_id > image_id:
+                return self._verifier.verify(other, view, np.ascontiguousarray(of_both[:, ::-1]))
+            return self._verifier.verify(view, other, of_both)
+
+        verdicts = self._workers.map(verify, zip(others, matches, strict=True))
+        return [pair for pair in verdicts if isinstance(pair, PairGeometry)]
