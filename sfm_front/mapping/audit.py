@@ -15,7 +15,13 @@ import pycolmap
 from sfm_front.geometry.epipolar_error import fits_epipolar
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.geometry.rays import undistorted_rays
-from sfm_front.mapping.covisibility import BoolArray, Covisibility, halves, parts
+from sfm_front.mapping.covisibility import (
+    BoolArray,
+    Covisibility,
+    IndexArray,
+    halves,
+    parts,
+)
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import Float64Array, Uint32Array
 
@@ -29,7 +35,7 @@ _CONTRADICTS = 0.25
 # Share of a model's matches in pairs that contradict it from which a user should look at it.
 _DOUBTFUL = 0.01
 # Matches of a pair by which an audit judges it, evenly chosen.
-_SAMPLE = 64
+_SAMPLE = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,44 +60,80 @@ class ModelAudit:
         return self.contradicted_share >= _DOUBTFUL
 
 
-def audit(
-    reconstruction: pycolmap.Reconstruction,
-    view_graph: ViewGraph,
-    *,
-    largest_part: int | None = None,
-) -> ModelAudit:
-    """Compare a model with the verified pairs of its photos.
-
-    ``largest_part``: the smaller of the worst parts is to have no more photos than this.
-    """
-    pairs = view_graph.pairs(reconstruction.reg_image_ids())
-    found = [
-        (view_graph.neighbors(pair[0])[pair[1]], agrees.mean())
-        for pair, _, agrees in agreeing(reconstruction, view_graph, pairs, at_most=_SAMPLE)
-    ]
-    num_matches, shares = np.array(found, np.float64).reshape(-1, 2).T
-    against = np.where(shares <= _CONTRADICTS, num_matches, 0)
-    speaking = against + np.where(shares >= _AGREES, num_matches, 0)
+def audit(reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> ModelAudit:
+    """Compare a model with the verified pairs of its photos."""
+    found = _Verdicts.of(reconstruction, view_graph)
     worst, worst_share = None, 0.0
-    if against.any():
+    if found.against.any():
         covisibility = Covisibility.of(reconstruction, min_observers=2)
         image_ids = covisibility.image_ids
-        ends = np.searchsorted(image_ids, np.array(pairs, np.int64))
+        ends = np.searchsorted(image_ids, found.pairs)
         for beyond in halves(covisibility.num_shared()):
-            size = int(np.count_nonzero(beyond))
-            if largest_part is not None and min(size, len(beyond) - size) > largest_part:
-                continue
             crossing = beyond[ends[:, 0]] != beyond[ends[:, 1]]
-            share = float(against[crossing].sum() / max(1, speaking[crossing].sum()))
+            share = found.against[crossing].sum() / max(1, found.speaking[crossing].sum())
             if share > worst_share:
-                worst, worst_share = parts(image_ids, beyond), share
+                worst, worst_share = parts(image_ids, beyond), float(share)
     return ModelAudit(
-        num_pairs=len(pairs),
-        num_contradicted=int(np.count_nonzero(against)),
-        contradicted_share=float(against.sum() / max(1, num_matches.sum())),
+        num_pairs=len(found.pairs),
+        num_contradicted=int(np.count_nonzero(found.against)),
+        contradicted_share=float(found.against.sum() / max(1, found.num_matches.sum())),
         worst_parts=worst,
         worst_share=worst_share,
     )
+
+
+def misplaced(
+    reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph
+) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """The others, and a photo or two linked ones that most of their matches want elsewhere: image
+    ids. None if there are none.
+
+    They are too few to have surroundings of their own. Of more photos the majority says nothing:
+    where two things look alike, most matches are wrong.
+    """
+    found = _Verdicts.of(reconstruction, view_graph)
+    if not found.against.any():
+        return None
+    image_ids = np.unique(found.pairs)
+    ends = np.searchsorted(image_ids, found.pairs)
+    against, speaking = (
+        np.bincount(ends.ravel(), np.repeat(matches, 2))
+        for matches in (found.against, found.speaking)
+    )
+    of_one = against / np.maximum(1, speaking)
+    # The matches that two photos have with each other say nothing of where both stand.
+    of_two = (against[ends].sum(axis=1) - 2 * found.against) / np.maximum(
+        1, speaking[ends].sum(axis=1) - 2 * found.speaking
+    )
+    if max(of_one.max(), of_two.max()) <= 0.5:
+        return None
+    beyond = np.zeros(len(image_ids), np.bool_)
+    beyond[of_one.argmax() if of_one.max() >= of_two.max() else ends[of_two.argmax()]] = True
+    return parts(image_ids, beyond)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Verdicts:
+    """The K verified pairs of a model: ``pairs`` (K, 2) image ids, ``num_matches`` (K,), of which
+    those of pairs that contradict it count in ``against``, and of pairs that say anything in
+    ``speaking``."""
+
+    pairs: IndexArray
+    num_matches: Float64Array
+    against: Float64Array
+    speaking: Float64Array
+
+    @classmethod
+    def of(cls, reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> _Verdicts:
+        pairs = view_graph.pairs(reconstruction.reg_image_ids())
+        found = [
+            (view_graph.neighbors(pair[0])[pair[1]], agrees.mean())
+            for pair, _, agrees in agreeing(reconstruction, view_graph, pairs, at_most=_SAMPLE)
+        ]
+        num_matches, shares = np.array(found, np.float64).reshape(-1, 2).T
+        against = np.where(shares <= _CONTRADICTS, num_matches, 0)
+        speaking = against + np.where(shares >= _AGREES, num_matches, 0)
+        return cls(np.array(pairs, np.int64).reshape(-1, 2), num_matches, against, speaking)
 
 
 def agreeing(

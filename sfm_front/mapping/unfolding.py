@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sfm_front.events import Evidence, LookAlikesRefused
 from sfm_front.mapping.atlas import Atlas
-from sfm_front.mapping.audit import agreeing, audit
+from sfm_front.mapping.audit import agreeing, misplaced
 from sfm_front.mapping.lookalikes import find_fold
 from sfm_front.mapping.model import Model
 
@@ -32,7 +32,7 @@ def _take_apart(atlas: Atlas, model: Model) -> bool:
     graph, evidence = atlas.view_graph, Evidence.SURROUNDINGS
     parts = find_fold(model.reconstruction, atlas.options.fold)
     if parts is None:
-        parts, evidence = _misplaced(atlas, model), Evidence.MATCHES
+        parts, evidence = misplaced(model.reconstruction, graph), Evidence.MATCHES
     if parts is None:
         return False
     larger, kept, num_refused = set(parts[0]), {}, 0
@@ -50,14 +50,3 @@ def _take_apart(atlas: Atlas, model: Model) -> bool:
     # A smaller part's photos wait, and start a model together with others.
     atlas.replace(model, [part for part in parts if len(part) >= atlas.options.min_model_size])
     return True
-
-
-def _misplaced(atlas: Atlas, model: Model) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
-    """The others, and photos that most of their matches want elsewhere, too few to have
-    surroundings of their own.
-
-    Of more photos the majority says nothing: where two things look alike, most matches are wrong.
-    """
-    largest_part = atlas.options.fold.min_observers - 1
-    audited = audit(model.reconstruction, atlas.view_graph, largest_part=largest_part)
-    return audited.worst_parts if audited.worst_share > 0.5 else None

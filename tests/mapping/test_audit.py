@@ -7,7 +7,7 @@ import pycolmap
 import pytest
 from helpers.lookalike_walk import NUM_PHOTOS, LookAlikeWalk
 
-from sfm_front.mapping.audit import agreeing, audit
+from sfm_front.mapping.audit import agreeing, audit, misplaced
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +41,23 @@ def test_a_photo_that_stands_elsewhere_is_named(walk):
     assert audited.worst_parts == (tuple(range(1, NUM_PHOTOS)), (NUM_PHOTOS,))
     assert audited.worst_share > 0.9
     assert audited.is_doubtful
+    assert misplaced(model, without_false_pairs(walk)) == audited.worst_parts
+
+
+def test_two_photos_that_stand_elsewhere_together_are_misplaced(walk):
+    """They stand to each other as before, and agree."""
+    model = walk.model(folded=False)
+    aside = pycolmap.Rigid3d(pycolmap.Rotation3d(), np.array([0.0, 3.0, 1.0]))
+    moved = (NUM_PHOTOS - 1, NUM_PHOTOS)
+    for image_id in moved:
+        image = model.image(image_id)
+        image.frame.set_cam_from_world(1, image.cam_from_world() * aside)
+    others = tuple(range(1, NUM_PHOTOS - 1))
+    assert misplaced(model, without_false_pairs(walk)) == (others, moved)
+
+
+def test_no_photo_of_a_true_model_is_misplaced(walk):
+    assert misplaced(walk.model(folded=False), without_false_pairs(walk)) is None
 
 
 def test_a_folded_model_contradicts_the_pairs_that_it_tears_apart(walk):
