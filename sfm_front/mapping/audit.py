@@ -45,7 +45,7 @@ class ModelAudit:
     ``num_contradicted`` of the ``num_pairs`` contradict its poses, with a share of
     ``contradicted_share`` of all matches. ``worst_parts``: image ids of the two parts of the model,
     the larger first, of whose matches the pairs that contradict it have the largest share,
-    ``worst_share``; None if no pair does.
+    ``worst_share``; None if the model is not doubtful.
     """
 
     num_pairs: int
@@ -63,8 +63,9 @@ class ModelAudit:
 def audit(reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> ModelAudit:
     """Compare a model with the verified pairs of its photos."""
     found = _Verdicts.of(reconstruction, view_graph)
+    contradicted_share = float(found.against.sum() / max(1, found.num_matches.sum()))
     worst, worst_share = None, 0.0
-    if found.against.any():
+    if contradicted_share >= _DOUBTFUL:
         covisibility = Covisibility.of(reconstruction, min_observers=2)
         image_ids = covisibility.image_ids
         ends = np.searchsorted(image_ids, found.pairs)
@@ -76,7 +77,7 @@ def audit(reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> Mod
     return ModelAudit(
         num_pairs=len(found.pairs),
         num_contradicted=int(np.count_nonzero(found.against)),
-        contradicted_share=float(found.against.sum() / max(1, found.num_matches.sum())),
+        contradicted_share=contradicted_share,
         worst_parts=worst,
         worst_share=worst_share,
     )
