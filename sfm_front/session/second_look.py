@@ -32,10 +32,12 @@ class SecondLookOptions:
     # Pairs that may be matched per photo of the session: this takes about as long as describing
     # it, and is enough for all pairs of 25 photos.
     pairs_per_photo: int = 12
-    # Nearest photos that a photo is matched with while nothing arrives, or if all pairs may be.
+    # Nearest photos that a photo is matched with.
     candidates: int = 24
-    # The same while others wait, and at the end.
+    # The same while others wait, and at the end, unless more than this share of the photos is
+    # poorly connected: in a dense capture a few that nothing overlaps with must not cost much.
     hurried_candidates: int = 2
+    sparse_share: float = 0.2
     # A photo that waits is looked at after so many others: they may place it for nothing.
     patience: int = 5
     # Verified pairs within its model that a registered photo needs to count as well connected.
@@ -102,9 +104,15 @@ class SecondLook:
     def at_end(self) -> None:
         """Place what can be placed, and look again at all that stays poorly connected."""
         self._atlas.refine_until_stable()
-        most = self._options.hurried_candidates
-        while self._step(len(self._catalog) if self._can_afford_all else most):
+        while self._step(self._num_candidates_at_end()):
             pass
+
+    def _num_candidates_at_end(self) -> int:
+        if self._can_afford_all:
+            return len(self._catalog)
+        limit = self._options.sparse_share * len(self._catalog)
+        is_sparse = len(self._poorly_connected()) > limit
+        return self._options.candidates if is_sparse else self._options.hurried_candidates
 
     def _step(self, num_candidates: int) -> bool:
         return any(self._look(image_id, num_candidates) for image_id in self._poorly_connected())
@@ -127,6 +135,8 @@ class SecondLook:
         if pairs:
             self._database.write_pairs(pairs)
             self._atlas.take_pairs(pairs)
+            # Where there were some, there may be more.
+            del self._looked_in[image_id]
         found = (i for pair in pairs for i in (pair.image_id1, pair.image_id2) if i != image_id)
         self._emit(LookedAgain(image_id, tuple(found), len(others), self.budget))
         return True

@@ -32,7 +32,7 @@ def orbit() -> SyntheticScene:
     return make_scene(NUM_PHOTOS, 400, seed=1, layout="orbit")
 
 
-def short_sighted(**second_look: int) -> SessionOptions:
+def short_sighted(**second_look: float) -> SessionOptions:
     """A session that matches each photo that arrives with its nearest one alone."""
     return SessionOptions(
         global_descriptor="vlad",
@@ -95,6 +95,16 @@ def test_no_pair_is_matched_twice_and_the_budget_is_kept(orbit, tmp_path):
     assert 0 < sum(event.num_tried for event in events) <= budget * NUM_PHOTOS
     assert events[-1].num_left == budget * NUM_PHOTOS - sum(event.num_tried for event in events)
     assert min(event.num_left for event in events) >= 0
+
+
+def test_a_sparse_capture_is_looked_at_closely_at_the_end(orbit, tmp_path):
+    """Though its pairs may not all be matched: five a photo are not enough for all of twelve."""
+    num_found = []
+    for share in (1.0, 0.2):
+        options = short_sighted(pairs_per_photo=5, hurried_candidates=0, sparse_share=share)
+        result, _ = run(orbit, tmp_path / str(share), options, SCATTERED)
+        num_found.append(result.summary.totals.num_registered)
+    assert num_found[0] < num_found[1] == NUM_PHOTOS
 
 
 def test_a_photo_may_overlap_with_one_that_came_later(looked):
