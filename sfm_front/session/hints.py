@@ -7,7 +7,7 @@ from collections.abc import Sequence, Set
 from sfm_front.mapping.view_graph import ViewGraph
 
 # Names in a sentence.
-_MOST = 3
+_MOST = 2
 
 
 def hint(image_id: int, view_graph: ViewGraph, registered: Set[int], nearest: Sequence[int]) -> str:
@@ -25,8 +25,9 @@ def hint(image_id: int, view_graph: ViewGraph, registered: Set[int], nearest: Se
         return ""
     known = _names(view_graph, near)
     if by_inliers:
-        return f"take some between {_names(view_graph, [image_id, *by_inliers])} and {known}"
-    return f"most similar are {known}: if they show the same, take some between them and it"
+        others = _names(view_graph, by_inliers)
+        return f"overlaps only with {others}: if {known} show the same place, take some between"
+    return f"most similar are {known}: if they show the same place, take some between them and it"
 
 
 def _names(view_graph: ViewGraph, image_ids: Sequence[int]) -> str:

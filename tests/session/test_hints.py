@@ -25,12 +25,15 @@ def test_a_photo_that_shares_too_little_with_the_model_is_to_be_linked_with_thos
 
 def test_a_group_is_to_be_linked_with_the_most_similar_registered_photo(view_graph):
     told = hint(3, view_graph, {4}, [1, 4, 3])
-    assert told == "take some between 000002.jpg, 000001.jpg, 000000.jpg and 000006.jpg"
+    assert told == (
+        "overlaps only with 000001.jpg, 000000.jpg: if 000006.jpg show the same place, take some "
+        "between"
+    )
 
 
 def test_a_photo_without_pairs_is_told_of_the_most_similar_ones(view_graph):
     told = hint(4, view_graph, {1, 2, 3}, [4, 2, 1])
-    assert told.startswith("most similar are 000001.jpg, 000000.jpg: if they show the same")
+    assert told.startswith("most similar are 000001.jpg, 000000.jpg: if they show the same place")
 
 
 def test_without_a_model_there_is_nothing_to_link_to(view_graph):
