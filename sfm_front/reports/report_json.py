@@ -43,6 +43,7 @@ def write_report(output: Path, summary: RunSummary) -> None:
             for model in summary.models
         ],
         "end": {"seconds": _rounded(summary.end_seconds), "events": summary.end_events},
+        "look_alikes": summary.look_alikes,
         "totals": {
             "photos": totals.num_photos,
             "used": totals.num_used,
@@ -156,6 +157,10 @@ def _summary(content: dict[str, Any]) -> RunSummary:
             latency=_latency(
                 totals.get("latency_seconds")
             ),  # absent in reports of earlier versions
+        ),
+        look_alikes=tuple(
+            tuple(tuple(group) for group in groups)
+            for groups in content.get("look_alikes", ())  # absent in reports of earlier versions
         ),
     )
 

@@ -11,7 +11,13 @@ from itertools import pairwise
 
 import pycolmap
 
-from sfm_front.events import PREFETCHED_STAGES, ModelEvent, ModelRefined, PhotoAdded
+from sfm_front.events import (
+    PREFETCHED_STAGES,
+    LookAlikesRefused,
+    ModelEvent,
+    ModelRefined,
+    PhotoAdded,
+)
 from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.run_summary import (
     AuditOutcome,
@@ -93,6 +99,17 @@ class RunReport:
             end_seconds=dict(seconds),
             end_events=_in_words(events),
             totals=self._totals(models, len(model_of), seconds, latencies_s),
+            look_alikes=self._look_alikes(events),
+        )
+
+    def _look_alikes(self, events: Iterable[ModelEvent]) -> tuple[tuple[tuple[str, ...], ...], ...]:
+        names = {
+            photo.image_id: photo.name for photo in self._photos if isinstance(photo, PhotoAdded)
+        }
+        return tuple(
+            tuple(tuple(names[image_id] for image_id in group) for group in event.image_ids)
+            for event in events
+            if isinstance(event, LookAlikesRefused)
         )
 
     def _totals(

@@ -115,7 +115,8 @@ Outcome: TypeAlias = Skipped | PhotoOutcome
 class RunSummary:
     """Photos in order of arrival, models largest first, and how the session ended.
 
-    ``end_events`` are those of idle times, too.
+    ``end_events`` are those of idle times, too. ``look_alikes``: names of the photos of two groups
+    that show things that look alike, each time a model was taken apart for it.
     """
 
     photos: tuple[Outcome, ...]
@@ -123,6 +124,7 @@ class RunSummary:
     end_seconds: dict[str, float]
     end_events: tuple[str, ...]
     totals: Totals
+    look_alikes: tuple[tuple[tuple[str, ...], ...], ...] = ()
 
     @property
     def used(self) -> list[PhotoOutcome]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from sfm_front.reports.run_summary import AuditOutcome, RunSummary
@@ -54,6 +55,9 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
             if photo.model is None
         ],
     )
+    for groups in summary.look_alikes:
+        first, second = map(_named, groups)
+        lines.append(f"taken for one place and taken apart, look-alikes: {first} and {second}")
     if not summary.models:
         lines.append(_advice(summary))
     return "\n".join(lines)
@@ -61,12 +65,15 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
 
 def _doubt(audit: AuditOutcome) -> str:
     """What speaks against a model; the photos named are those of the smaller group."""
-    names = audit.worst_groups[-1]
-    named = ", ".join(names[:_MOST_NAMED]) + (", ..." if len(names) > _MOST_NAMED else "")
     return (
         f"doubtful: {audit.num_contradicted} of its {audit.num_pairs} pairs, with "
-        f"{audit.contradicted_share:.1%} of the matches, contradict it; look first at {named}"
+        f"{audit.contradicted_share:.1%} of the matches, contradict it; look first at "
+        + _named(audit.worst_groups[-1])
     )
+
+
+def _named(names: Sequence[str]) -> str:
+    return ", ".join(names[:_MOST_NAMED]) + (", ..." if len(names) > _MOST_NAMED else "")
 
 
 def _advice(summary: RunSummary) -> str:

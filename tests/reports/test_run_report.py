@@ -9,7 +9,14 @@ import pytest
 from helpers.model_building import looking, make_model
 
 from sfm_front.errors import InputError
-from sfm_front.events import ModelRefined, ModelStarted, PhotoAdded, StartKind
+from sfm_front.events import (
+    Evidence,
+    LookAlikesRefused,
+    ModelRefined,
+    ModelStarted,
+    PhotoAdded,
+    StartKind,
+)
 from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.report_json import read_report, write_report
 from sfm_front.reports.run_report import RunReport
@@ -39,6 +46,7 @@ def summary(output: Path, number: int, names: list[str], *, error_px: float, poi
 
 STARTED = ModelStarted(1, (1, 2), 16.0, 100, StartKind.STREAM)
 REFINED = ModelRefined(1, 2, 50, seconds=0.5)
+REFUSED = LookAlikesRefused(1, ((1, 2), (3,)), Evidence.SURROUNDINGS, 40)
 BROKEN = Skipped("broken.jpg", SkipReason.TRUNCATED, "half a JPEG")
 PHOTOS = [
     PhotoAdded("ä 1.jpg", image_id=1, num_keypoints=90, seconds={"sift": 0.25}),
@@ -88,7 +96,7 @@ def run(tmp_path) -> RunSummary:
             ModelAudit(0, 0, 0.0, None, 0.0),
         ],
         seconds={"export": 0.75},
-        events=[REFINED, STARTED],
+        events=[REFINED, STARTED, REFUSED],
         latencies_s=[2.0, 0.12345678],
     )
 
@@ -122,6 +130,11 @@ def test_a_row_a_photo_in_their_order(content):
     assert third["why_not_registered"] == "no verified matches"
     assert third["what_would_help"] == "take one between them"
     assert first["why_not_registered"] is None
+
+
+def test_look_alikes_are_told_by_name(run, content, tmp_path):
+    assert content["look_alikes"] == [[["ä 1.jpg", "b.jpg"], ["c.jpg"]]]
+    assert read_report(tmp_path).look_alikes == run.look_alikes
 
 
 def test_models_and_the_end(content):
@@ -158,7 +171,7 @@ def test_models_and_the_end(content):
             },
         },
     ]
-    assert content["end"] == {"seconds": {"export": 0.75}, "events": [str(STARTED)]}
+    assert content["end"] == {"seconds": {"export": 0.75}, "events": [str(STARTED), str(REFUSED)]}
 
 
 def test_totals(content):

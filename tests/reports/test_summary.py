@@ -78,6 +78,12 @@ def test_the_summary_says_what_became_of_all():
     ]
 
 
+def test_look_alikes_are_named():
+    run = replace(summary([PLACED]), look_alikes=((("a.jpg", "b.jpg"), ("c.jpg",)),))
+    line = "taken for one place and taken apart, look-alikes: a.jpg, b.jpg and c.jpg"
+    assert line in closing_summary(run, Path("out")).splitlines()
+
+
 def test_many_reasons_are_counted():
     photos = [waiting(f"{n}.jpg", "far off" if n % 3 else "blurred") for n in range(30)]
     assert closing_summary(summary(photos), Path("out")).splitlines()[-3:] == [
