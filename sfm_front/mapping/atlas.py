@@ -46,8 +46,8 @@ class AtlasOptions:
     # Restarts that may register over half as many photos as the best model, but no more than it,
     # before giving up.
     max_failures: int = 1
-    # In sessions of fewer photos than this, both may be so many photos' worth, and only a restart
-    # that registers over half of the linked photos counts.
+    # Small models may have more of both, as many as register so many photos in all; of those only
+    # a restart that registers over half of the linked photos counts as a failure.
     cheap_restarts: int = 40
     initialization: InitializationOptions = field(default_factory=InitializationOptions)
     mapper: MapperOptions = field(default_factory=MapperOptions)

@@ -31,8 +31,8 @@ class FoldOptions:
 
     # Cells, a 24th of the long side each, in which a photo of either part misses what the other
     # part sees there, on average, and their share of those in which it sees the same
-    # (TUNING: fold). Few cells tell little; a small share may be something that
-    # was moved between two visits.
+    # (TUNING: fold). Few cells tell little; a small share may be something that was moved between
+    # two visits.
     min_cells: float = 7.0
     min_share: float = 0.08
     # Observations of the points that count. Passers-by and wrong matches have fewer.

@@ -248,14 +248,9 @@ class Model:
         reconstruction = copy.deepcopy(self.reconstruction)
         for image_id in sorted(self.registered - set(image_ids)):
             reconstruction.deregister_frame(reconstruction.image(image_id).frame_id)
-        return Model.restored(
-            self._view_graph,
-            self._options,
-            reconstruction,
-            self.state,
-            self.emit,
-            self._adjuster,
-        )
+        part = self.succeeded_by(reconstruction)
+        part.emit = self.emit
+        return part
 
     def finish(self) -> None:
         """Refine a last time. The model cannot grow any more after this."""

@@ -17,7 +17,7 @@ class Restart:
 
     def __init__(self, atlas: Atlas) -> None:
         self._atlas = atlas
-        self._known = (0, 0)
+        self._revision = 0
         self._starts: Iterator[Model] = iter(())
         self._failures = 0
         self._fresh: Model | None = None
@@ -25,12 +25,11 @@ class Restart:
     def go_on(self, at_most: int | None = None) -> bool:
         """Grow the fresh model by this many photos, or begin one; False if none is worth it.
 
-        Begins anew if photos or pairs have come since the last call.
+        Begins anew if the view graph has changed since the last call.
         """
         atlas = self._atlas
-        known = len(atlas.view_graph), atlas.view_graph.num_pairs
-        if known != self._known:
-            self._known, self._failures, self._fresh = known, 0, None
+        if atlas.view_graph.revision != self._revision:
+            self._revision, self._failures, self._fresh = atlas.view_graph.revision, 0, None
             self._starts = atlas.initializer.best_starts(
                 max(atlas.options.fresh_starts, self._num_affordable)
             )
@@ -41,7 +40,7 @@ class Restart:
             self._fresh = next(self._starts, None)
             if self._fresh is None:
                 return False
-        if self._fresh.grow(atlas.view_graph.image_ids, at_most) == []:
+        if not self._fresh.grow(atlas.view_graph.image_ids, at_most):
             self._judge(self._fresh)
             self._fresh = None
         return True
@@ -79,11 +78,8 @@ class Restart:
         missed = linked - atlas.registered
         if not self._num_affordable:
             # By fewer pairs, no other start would hold them either.
-            missed = {i for i in missed if self._is_well_linked(i, registered)}
+            graph, least = atlas.view_graph, atlas.options.min_links
+            missed = {i for i in missed if graph.num_neighbors(i, registered) >= least}
         if len(missed) > atlas.options.max_missed_share * len(linked):
             return True
         return len(registered) < atlas.options.min_share * len(linked)
-
-    def _is_well_linked(self, image_id: int, registered: set[int]) -> bool:
-        pairs = self._atlas.view_graph.neighbors(image_id).keys() & registered
-        return len(pairs) >= self._atlas.options.min_links

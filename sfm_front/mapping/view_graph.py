@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Set
 
 import numpy as np
 import pycolmap
@@ -25,6 +25,8 @@ class ViewGraph:
         self._neighbors: dict[int, dict[int, int]] = {}
         self._angles_rad: dict[tuple[int, int], float] = {}
         self._reduced: dict[tuple[int, int], Uint32Array] = {}
+        # Counts changes: whatever was made of an earlier state is out of date.
+        self.revision = 0
 
     def add(
         self,
@@ -56,6 +58,7 @@ class ViewGraph:
 
         Models that hold these photos must be told: ``Model.take_pairs``.
         """
+        self.revision += 1
         for pair in pairs:
             self._cache.correspondence_graph.add_two_view_geometry(
                 pair.image_id1, pair.image_id2, pair.two_view_geometry
@@ -67,10 +70,9 @@ class ViewGraph:
     def __len__(self) -> int:
         return len(self._neighbors)
 
-    @property
-    def num_pairs(self) -> int:
-        """Verified pairs."""
-        return len(self._angles_rad)
+    def num_neighbors(self, image_id: int, among: Set[int]) -> int:
+        """How many of these photos have a verified pair with this one."""
+        return len(self._neighbors[image_id].keys() & among)
 
     @property
     def image_ids(self) -> list[int]:
@@ -126,6 +128,7 @@ class ViewGraph:
                 del self._neighbors[first][second], self._neighbors[second][first]
                 del self._angles_rad[first, second]
         self._reduced.update(kept)
+        self.revision += 1
         # pycolmap cannot take anything out.
         old, self._cache = self._cache, pycolmap.DatabaseCache()
         for camera in old.cameras.values():

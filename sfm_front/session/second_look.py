@@ -8,7 +8,7 @@ features had eight among those that re-ranking looks at.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,31 +91,40 @@ class SecondLook:
             self._known[image_id].add(other)
             self._known[other].add(image_id)
 
-    def after_photo(self, image_id: int) -> None:
-        """A photo has been added: look again at an earlier one that still waits, with few pairs."""
+    def due_after(self, image_id: int) -> int | None:
+        """The earlier photo to look at again once this one was added: it still waits, with few
+        pairs."""
         atlas, earlier = self._atlas, image_id - self._options.patience
-        if earlier in atlas.waiting and self._has_few_pairs(earlier, atlas.view_graph.image_ids):
-            self._look(earlier, self._options.hurried_candidates)
+        if earlier < 1 or len(atlas.view_graph.neighbors(earlier)) >= self._options.min_pairs:
+            return None
+        return None if earlier in atlas.registered else earlier
+
+    def at_photo(self, image_id: int) -> None:
+        """Look again at one photo while others wait."""
+        self._look(image_id, self._options.hurried_candidates)
 
     def while_idle(self) -> bool:
         """Look again at one photo that is poorly connected; False if no such look is left."""
-        return self._step(self._options.candidates)
+        return self._step(self._poorly_connected(), self._options.candidates)
 
     def at_end(self) -> None:
         """Place what can be placed, and look again at all that stays poorly connected."""
         self._atlas.refine_until_stable()
-        while self._step(self._num_candidates_at_end()):
-            pass
+        while True:
+            photos = self._poorly_connected()
+            if not self._step(photos, self._num_candidates_at_end(len(photos))):
+                return
 
-    def _num_candidates_at_end(self) -> int:
+    def _num_candidates_at_end(self, num_poorly_connected: int) -> int:
+        num_photos, options = len(self._catalog), self._options
         if self._can_afford_all:
-            return len(self._catalog)
-        limit = self._options.sparse_share * len(self._catalog)
-        is_sparse = len(self._poorly_connected()) > limit
-        return self._options.candidates if is_sparse else self._options.hurried_candidates
+            return num_photos
+        is_sparse = num_poorly_connected > options.sparse_share * num_photos
+        return options.candidates if is_sparse else options.hurried_candidates
 
-    def _step(self, num_candidates: int) -> bool:
-        return any(self._look(image_id, num_candidates) for image_id in self._poorly_connected())
+    def _step(self, image_ids: Iterable[int], num_candidates: int) -> bool:
+        """Look at the first of these photos with which that is still to be done."""
+        return any(self._look(image_id, num_candidates) for image_id in image_ids)
 
     @property
     def budget(self) -> int:
@@ -176,9 +185,9 @@ class SecondLook:
     def _can_afford_all(self) -> bool:
         return len(self._catalog) <= 2 * self._options.pairs_per_photo + 1
 
-    def _has_few_pairs(self, image_id: int, photos: Collection[int]) -> bool:
-        pairs = self._atlas.view_graph.neighbors(image_id).keys() & photos
-        return len(pairs) < self._options.min_pairs
+    def _has_few_pairs(self, image_id: int, photos: Set[int]) -> bool:
+        graph = self._atlas.view_graph
+        return graph.num_neighbors(image_id, photos) < self._options.min_pairs
 
     def _matched(self, image_id: int, other_ids: Sequence[int]) -> list[PairGeometry]:
         """Pairs of a photo with those that overlap with it, by all features."""

@@ -335,11 +335,21 @@ class Session(Closeable):
         )
         self._is_settled = False
         self._tell(added, registered)
-        dismissed = {i for i, why in rejected.items() if why.reason is Rejection.UNLIKELY}
-        parts.second_look.note(image_id, rejected.keys() - dismissed)
-        parts.second_look.note(image_id, (pair.image_id2 for pair in pairs))
-        self._placing_more(lambda: parts.second_look.after_photo(image_id))
+        self._look_again_after(image_id, pairs, rejected)
         return added
+
+    def _look_again_after(
+        self, image_id: int, pairs: Iterable[PairGeometry], rejected: Mapping[int, Rejected]
+    ) -> None:
+        """At an earlier photo, if one is due once this one was added and matched."""
+        second_look = self._parts.second_look
+        second_look.note(image_id, (pair.image_id2 for pair in pairs))
+        # The unlikely ones were not matched on all features.
+        matched = (i for i, why in rejected.items() if why.reason is not Rejection.UNLIKELY)
+        second_look.note(image_id, matched)
+        due = second_look.due_after(image_id)
+        if due is not None:
+            self._placing_more(lambda: second_look.at_photo(due))
 
     def _tell(self, added: PhotoAdded, registered: Sequence[int]) -> None:
         self._parts.report.add(added)
