@@ -67,11 +67,17 @@ class NotYet:
 
 @dataclass(frozen=True, slots=True)
 class GeoPosition:
-    """A WGS84 position: latitude and longitude in degrees, altitude in metres if known."""
+    """A WGS84 position: latitude and longitude in degrees, altitude in metres if known.
+
+    Standard deviations in metres, where whoever measured it says so: ``horizontal_sigma_m`` of
+    east and of north each, ``vertical_sigma_m`` of the altitude.
+    """
 
     latitude_deg: float
     longitude_deg: float
     altitude_m: float | None = None
+    horizontal_sigma_m: float | None = None
+    vertical_sigma_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
