@@ -62,6 +62,7 @@ class BackgroundAdjuster(Closeable):
             # The photos that come meanwhile need the others.
             num_threads=max(1, options.num_threads // 2),
             refine_intrinsics=options.refine_intrinsics,
+            min_coverage_gain=options.min_coverage_gain,
         )
         process = self._running()
         assert process.stdin is not None

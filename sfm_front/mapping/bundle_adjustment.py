@@ -41,20 +41,29 @@ def adjust_robustly(
     principal_point: bool,
 ) -> None:
     """Adjust the whole model with a Cauchy loss; ``principal_point``: whether it may move."""
+    adjustment = robust_adjustment(options, reconstruction.num_reg_images())
+    adjustment.refine_principal_point = principal_point
+    adjust_all(reconstruction, adjustment)
+    reconstruction.update_point_3d_errors()
+
+
+def robust_adjustment(
+    options: RobustAdjustmentOptions, num_photos: int
+) -> pycolmap.BundleAdjustmentOptions:
+    """pycolmap's options for a model of so many photos; the principal point stays."""
     adjustment = pycolmap.BundleAdjustmentOptions()
     adjustment.print_summary = False
     adjustment.refine_focal_length = options.refine_intrinsics
     adjustment.refine_extra_params = options.refine_intrinsics
-    adjustment.refine_principal_point = principal_point
+    adjustment.refine_principal_point = False
     adjustment.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     adjustment.ceres.loss_function_scale = options.loss_scale_px
-    large = reconstruction.num_reg_images() >= options.large_from
+    large = num_photos >= options.large_from
     adjustment.ceres.solver_options.function_tolerance = (
         options.large_tolerance if large else options.tolerance
     )
     adjustment.ceres.solver_options.num_threads = options.num_threads
-    adjust_all(reconstruction, adjustment)
-    reconstruction.update_point_3d_errors()
+    return adjustment
 
 
 def adjust_all(

@@ -83,6 +83,9 @@ class MapperOptions:
     retry_growth: float = 1.2
     # Refine focal length and distortion.
     refine_intrinsics: bool = True
+    # A global adjustment moves the cameras by those points alone that add this much to what others
+    # cover of a photo, and the others afterwards (TUNING: coverage-gain).
+    min_coverage_gain: float = 0.1
     # Of the bundle adjustment.
     num_threads: int = 2
     # Of all RANSAC.
@@ -97,6 +100,10 @@ class MapperOptions:
     def __post_init__(self) -> None:
         if self.retry_growth < 1:
             raise ConfigError(f"retry_growth must be at least 1, got {self.retry_growth}")
+        if self.min_coverage_gain < 0:
+            raise ConfigError(
+                f"min_coverage_gain must not be negative, got {self.min_coverage_gain}"
+            )
         if self.num_threads < 1:
             raise ConfigError(f"num_threads must be at least 1, got {self.num_threads}")
         robust = replace(
@@ -119,6 +126,8 @@ class MapperOptions:
         options.ba_refine_focal_length = self.refine_intrinsics
         options.ba_refine_extra_params = self.refine_intrinsics
         options.mapper.max_reg_trials = _UNLIMITED_TRIALS
+        options.mapper.ba_global_ignore_redundant_points3D = True
+        options.mapper.ba_global_prune_points_min_coverage_gain = self.min_coverage_gain
         options.mapper.abs_pose_refine_focal_length = self.refine_intrinsics
         options.mapper.abs_pose_refine_extra_params = self.refine_intrinsics
         return options

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import pycolmap
 
-from sfm_front.mapping.bundle_adjustment import adjust_all
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +28,7 @@ class AdjustmentRequest:
     iterations: int
     num_threads: int
     refine_intrinsics: bool
+    min_coverage_gain: float
 
 
 def adjust(request: AdjustmentRequest) -> None:
@@ -42,8 +42,28 @@ def adjust(request: AdjustmentRequest) -> None:
     solver.function_tolerance = request.tolerance
     solver.max_num_iterations = request.iterations
     solver.num_threads = request.num_threads
-    adjust_all(reconstruction, adjustment)
+    options = pycolmap.IncrementalMapperOptions()
+    options.ba_global_ignore_redundant_points3D = True
+    options.ba_global_prune_points_min_coverage_gain = request.min_coverage_gain
+    mapper = pycolmap.IncrementalMapper(_cache_of(reconstruction))
+    mapper.begin_reconstruction(reconstruction)
+    mapper.adjust_global_bundle(options, adjustment)
+    mapper.end_reconstruction(False)
     reconstruction.write_binary(request.model)
+
+
+def _cache_of(reconstruction: pycolmap.Reconstruction) -> pycolmap.DatabaseCache:
+    """What a mapper asks for, without the matches: an adjustment needs none."""
+    cache = pycolmap.DatabaseCache()
+    for camera in reconstruction.cameras.values():
+        cache.add_camera(camera)
+    for rig in reconstruction.rigs.values():
+        cache.add_rig(rig)
+    for frame in reconstruction.frames.values():
+        cache.add_frame(frame)
+    for image in reconstruction.images.values():
+        cache.add_image(image)
+    return cache
 
 
 def main() -> None:
