@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import pycolmap
 
-from sfm_front.geometry.similarity import Similarities
 from sfm_front.georeference.consensus import (
     SHARED,
     Floor,
@@ -26,9 +25,9 @@ MIN_POSITIONS = 3
 """Below, no similarity is determined."""
 
 # Rounds of choosing the fixes that are right and fitting to them.
-_MAX_ROUNDS = 5
-# Distinct to this many metres.
-_DISTINCT_M = 0.001
+_MAX_ROUNDS = 4
+# Points are distinct to this many metres, or units of the model.
+_DISTINCT = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,23 +99,31 @@ def align(
     orientation. Where they agree on a horizon it counts as one more observation: it tells the
     rotation about the line on which all photos of a strip or a street lie.
     """
-    distinct = np.unique(np.round(fixes.enu / _DISTINCT_M), axis=0)
-    if min(len(distinct), len(np.unique(centres, axis=0))) < MIN_POSITIONS:
+    if min(_num_places(fixes.enu[:, :2]), _num_places(centres)) < MIN_POSITIONS:
         return None
     level = None if cam_from_model is None else LevelCameras(cam_from_model)
     similarity, floor = find_consensus(centres, fixes, level, seed)
     inliers = agreeing(similarity, centres, fixes, floor)
+    starts = [similarity]
+    if level is not None:
+        # What positions on a line leave open may be anything in a hypothesis.
+        starts.append(level.turned_upright(similarity, centres[inliers]))
     for _ in range(_MAX_ROUNDS):
-        if inliers.sum() < MIN_POSITIONS:
+        if _num_places(fixes.enu[inliers, :2]) < MIN_POSITIONS:
             return None
         fitted_to = inliers
-        best = _fit_either_way(similarity, centres[inliers], fixes[inliers], floor, level)
-        similarity = best.similarity
-        floor = likeliest_floor(similarity, centres, fixes)
-        inliers = agreeing(similarity, centres, fixes, floor)
+        no_offsets = np.zeros((int(inliers.sum()), 0))
+        fits = [
+            fit(start, centres[inliers], fixes[inliers], floor, level, no_offsets)
+            for start in starts
+        ]
+        best = min(fits, key=lambda one: one.cost)
+        starts = [best.similarity]
+        floor = likeliest_floor(best.similarity, centres, fixes)
+        inliers = agreeing(best.similarity, centres, fixes, floor)
         if (fitted_to == inliers).all():
             break
-    by_flight = flight_height_offsets(similarity, centres, fixes, floor, level)
+    by_flight = flight_height_offsets(best.similarity, centres, fixes, floor, level)
     if by_flight is None:
         return _alignment(best, centres, fixes, floor, fitted_to, {})
     raised = fixes.raised(by_flight.offsets)
@@ -124,19 +131,10 @@ def align(
     return _alignment(by_flight.fit, centres, raised, floor, by_flight.inliers, by_flight.offsets)
 
 
-def _fit_either_way(
-    start: Similarities,
-    centres: Float64Array,
-    fixes: Fixes,
-    floor: Floor,
-    level: LevelCameras | None,
-) -> Fit:
-    """From the start as it is, and from it with its cameras upright: what positions on a line leave
-    open may be anything in the start."""
-    starts = [start] if level is None else [start, level.turned_upright(start, centres)]
-    no_columns = np.zeros((len(fixes), 0))
-    fits = [fit(one, centres, fixes, floor, level, no_columns) for one in starts]
-    return min(fits, key=lambda one: one.cost)
+def _num_places(points: Float64Array) -> int:
+    """How many of the points (N, D) differ. Of positions, in the plane: receivers that stand still
+    go on counting heights."""
+    return len(np.unique(np.round(points / _DISTINCT), axis=0))
 
 
 def _alignment(

@@ -11,13 +11,13 @@ from sfm_front.georeference.fixes import BoolArray, Fixes
 from sfm_front.georeference.levelling import LevelCameras
 from sfm_front.types import Float64Array
 
-# Samples of three: with five wrong among nine, some 15 of these are clean.
-_HYPOTHESES = 192
+# Samples of three: with five wrong among nine, some 10 of these are clean.
+_HYPOTHESES = 128
 # Positions on which they are compared.
-_COMPARED = 150
+_COMPARED = 120
 # What the difference of model and GPS may be in metres, beyond the standard deviations: a drifting
 # receiver, a bent model. Steps may be wide, as the scatter is estimated afterwards.
-_FLOORS_M = tuple((plane, height) for plane in (0, 1, 4, 16) for height in (0, 1, 4, 16, 64))
+_FLOORS_M = tuple((plane, height) for plane in (0, 1, 4, 16) for height in (0, 4, 16, 64))
 # A wrong position lies anywhere in a box of this size: east, north and up.
 _BOX_M = (1000.0, 1000.0, 200.0)
 

@@ -7,7 +7,7 @@ import numpy as np
 from sfm_front.types import Float64Array
 
 # Photos are taken together to so many blocks: what happens within them is averaged out.
-_MAX_BLOCKS = 48
+_MAX_BLOCKS = 32
 # How the errors may drift: this share of their variance is common to photos that are near each
 # other, up to this share of the whole sequence. Nothing is known of it beforehand.
 _SHARES = (0.5, 0.9, 0.99)

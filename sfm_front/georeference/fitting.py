@@ -21,9 +21,9 @@ _TAILS = 5.0
 # What the claimed standard deviations weigh against the residuals, in observations: enough for
 # three fixes, which leave next to nothing.
 _PRIOR_OBSERVATIONS = 0.1
-_MAX_STEPS = 30
+_MAX_STEPS = 20
 # Of a step that changes nothing, in standard deviations.
-_STILL = 0.01
+_STILL = 0.03
 # Standard deviation of what is known beforehand, so that what nothing else fixes comes out as open.
 _VAGUE = np.array([1.0, *[1.0] * 3, *[1e4] * 3])
 _VAGUE_OFFSET_M = 1e3

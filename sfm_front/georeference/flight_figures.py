@@ -13,6 +13,8 @@ from sfm_front.types import Float64Array
 
 # Points that are looked at: evenly over all.
 _MAX_POINTS = 5000
+# Height over the points as a share of the distance to them: half of it is 30 degrees down.
+_MIN_DOWN = 0.5
 # Points beyond these percentiles along either axis may be wrong, and are no ground.
 _TRIMMED_PERCENT = 1.0
 
@@ -33,7 +35,7 @@ class FlightFigures:
 def flight_figures(
     model: pycolmap.Reconstruction, enu_from_model: pycolmap.Sim3d
 ) -> FlightFigures | None:
-    """From a model's cameras and points; None without points."""
+    """From a model's cameras and points; None without points, or if cameras do not look down."""
     points = [model.points3D[point_id] for point_id in sorted(model.points3D)]
     points = points[:: -(-len(points) // _MAX_POINTS) or 1]
     rows, image_ids = _observations(points)
@@ -46,9 +48,12 @@ def flight_figures(
     centres = enu_from_model * np.array([image.projection_center() for image in images])
     ground = enu_from_model * np.array([point.xyz for point in points])
     away = centres[columns] - ground[rows]
+    distances, height_m = np.linalg.norm(away, axis=1), float(np.median(away[:, 2]))
+    if height_m < _MIN_DOWN * np.median(distances):
+        return None
     return FlightFigures(
-        gsd_cm_per_px=float(100 * np.median(np.linalg.norm(away, axis=1) / focals_px[columns])),
-        height_m=float(np.median(away[:, 2])),
+        gsd_cm_per_px=float(100 * np.median(distances / focals_px[columns])),
+        height_m=height_m,
         area_m2=area_of_hull_m2(ground[:, :2]),
     )
 

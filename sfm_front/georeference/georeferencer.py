@@ -45,9 +45,8 @@ class Georeference:
     """Where a model stands on the earth.
 
     ``frame``: None until a model was aligned. ``alignment``: of the model as it was given, None in
-    state NONE; its rows belong to the photos ``image_ids``. ``reasons``: why the state is no
-    better, or what a metric one rests on. ``held``: the newest estimate is not taken, and the last
-    of the reasons says why; the frame is where it was.
+    state NONE; its rows belong to the photos ``image_ids``. ``reasons``: as in ``Verdict``.
+    ``held``: the newest estimate is not taken, and the reason says why; the frame is where it was.
     """
 
     state: GeoreferenceState = GeoreferenceState.NONE

@@ -15,7 +15,8 @@ from sfm_front.types import Float64Array
 _LEVEL_SIGMA = np.radians(3.0)
 # Sine of the roll (root mean square over the photos) above which nobody held them level.
 _MAX_ROLL = 0.2
-_ANGLES = np.radians(np.arange(0.0, 360.0, 0.5))
+# Turns that are tried; the adjustment does the rest.
+_ANGLES = np.radians(np.arange(0.0, 360.0, 2.0))
 # Weight of the right way up against level: decides where level leaves two ways, or all.
 _UPRIGHT_WEIGHT = 1e-3
 # As a squared number of standard deviations: photos are not taken upside down.

@@ -16,6 +16,8 @@ from sfm_front.types import Float64Array
 # how much looser than the others it is.
 _LINE_COSINE = 0.9
 _LINE_TIMES = 2.0
+# So many claimed standard deviations are worth a word.
+_DIFFERENT = 2.0
 
 
 class GeoreferenceState(Enum):
@@ -49,7 +51,8 @@ class SpreadOptions:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A state, and why it is no better; of a metric one, what it rests on beside positions."""
+    """A state, and why it is no better; of a metric one, what it rests on beside positions. Then,
+    where model and positions differ by more than these claim."""
 
     state: GeoreferenceState
     reasons: tuple[str, ...] = ()
@@ -81,12 +84,28 @@ def judge(alignment: Alignment | None, fixes: Fixes, options: SpreadOptions) -> 
             f"the scale is uncertain by {100 * alignment.scale_sigma:.0f} %: "
             f"positions within {extent_m:.0f} m that are off by {error_m:.1f} m"
         )
-    if reasons:
-        return Verdict(GeoreferenceState.PROVISIONAL, tuple(reasons))
-    if _loosest_deg(alignment.positions_only) > options.max_rotation_sigma_deg:
+    state = GeoreferenceState.PROVISIONAL if reasons else GeoreferenceState.METRIC
+    by_position_deg = _loosest_deg(alignment.positions_only)
+    if not reasons and by_position_deg > options.max_rotation_sigma_deg:
         what = "the photos lie on a line: the rotation about it" if line else "the rotation"
         reasons.append(f"{what} is that of cameras held level (± {loosest_deg:.0f}°)")
-    return Verdict(GeoreferenceState.METRIC, tuple(reasons))
+    return Verdict(state, (*reasons, *_differences(alignment, fixes)))
+
+
+def _differences(alignment: Alignment, fixes: Fixes) -> list[str]:
+    """Where positions and model differ by more than the positions claim."""
+    said = []
+    for axes, where in ((slice(0, 2), "in the plane"), (slice(2, 3), "in height")):
+        known = fixes.known[alignment.inliers, axes]
+        residuals = alignment.residuals[alignment.inliers, axes][known]
+        sigmas = fixes.sigmas[alignment.inliers, axes][known]
+        if known.any() and np.mean((residuals / sigmas) ** 2) > _DIFFERENT**2:
+            rms, claimed = np.sqrt(np.mean(residuals**2)), np.median(sigmas)
+            said.append(
+                f"model and positions differ by {rms:.2g} m {where}, "
+                f"where positions claim {claimed:.2g} m"
+            )
+    return said
 
 
 def _loosest_deg(covariance: Float64Array) -> float:

@@ -130,6 +130,8 @@ def test_two_positions_or_one_place_align_nothing(heights):
     assert align(made.centres[:2], made.fixes()[np.arange(2)]) is None
     made.enu[:] = made.enu[0]
     assert align(made.centres, made.fixes()) is None
+    made.enu[:, 2] += np.arange(12)  # as of a receiver that lost its fix
+    assert align(made.centres, made.fixes()) is None
 
 
 def test_the_same_input_gives_the_same_answer():

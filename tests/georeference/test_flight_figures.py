@@ -39,6 +39,11 @@ def test_a_flight_over_flat_ground():
     assert figures.area_m2 == pytest.approx(100 * 100, rel=0.01)
 
 
+def test_photos_that_look_ahead_are_no_flight():
+    wall = np.column_stack([np.linspace(0, 100, 50), np.full(50, 50.0), np.full(50, HEIGHT_M)])
+    assert flight_figures(flown(wall), FROM_MODEL) is None
+
+
 def test_without_points_there_are_no_figures():
     assert flight_figures(flown(np.zeros((0, 3))), FROM_MODEL) is None
 

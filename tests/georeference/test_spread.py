@@ -81,6 +81,13 @@ def test_positions_as_far_off_as_they_are_apart_leave_the_scale_open():
     assert any(reason.startswith("the scale is uncertain by") for reason in found.reasons)
 
 
+def test_it_is_said_where_model_and_positions_differ_by_more_than_these_claim():
+    photos = flight(strips(40), seed=0, noise_m=(0.5, 0.5, 30.0))
+    found = verdict(photos)
+    assert any("in height, where positions claim 10 m" in reason for reason in found.reasons)
+    assert not any("in the plane" in reason for reason in found.reasons)
+
+
 def test_without_heights_up_is_open():
     photos = flight(strips(20), seed=0)
     photos.enu[:, 2] = np.nan
