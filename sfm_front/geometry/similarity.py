@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,24 @@ class Similarities:
             scales = (singular * signs).sum(axis=1) / (centred[0] ** 2).sum(axis=(1, 2))
             moved = scales[:, None] * np.einsum("hij,hj->hi", rotations, means[0])
         return cls(scales, rotations, means[1] - moved)
+
+    @classmethod
+    def of(cls, similarities: Sequence[pycolmap.Sim3d]) -> Similarities:
+        """Those that pycolmap has."""
+        return cls(
+            np.array([one.scale for one in similarities], np.float64),
+            np.array([one.rotation.matrix() for one in similarities], np.float64),
+            np.array([one.translation for one in similarities], np.float64),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Similarities]) -> Similarities:
+        """All of them in one."""
+        return cls(
+            np.concatenate([part.scales for part in parts]),
+            np.concatenate([part.rotations for part in parts]),
+            np.concatenate([part.translations for part in parts]),
+        )
 
     def __len__(self) -> int:
         return len(self.scales)

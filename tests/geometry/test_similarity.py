@@ -43,3 +43,11 @@ def test_a_mirrored_set_is_turned_and_not_mirrored():
 def test_points_that_coincide_yield_nothing_without_complaint():
     same = np.ones((1, 3, 3))
     assert not np.isfinite(Similarities.between(same, same)(np.ones((2, 3)))).any()
+
+
+def test_similarities_of_pycolmap_and_of_several_parts_are_the_same():
+    parts = [Similarities.of(TRUE[:1]), Similarities.of(TRUE[1:])]
+    joined = Similarities.joined(parts)
+    assert len(joined) == 2
+    for number, true in enumerate(TRUE):
+        np.testing.assert_allclose(joined[number].only().matrix(), true.matrix(), atol=1e-12)
