@@ -25,7 +25,7 @@ def marked(sightings, *shifts):
     """With marks moved by pixels: (number, x, y)."""
     moved = list(sightings)
     for number, x, y in shifts:
-        moved[number] = Sighting(moved[number].image, moved[number].xy + (x, y))
+        moved[number] = Sighting(moved[number].image, moved[number].xy + np.array([x, y]))
     return moved
 
 
