@@ -57,6 +57,7 @@ LIBRARIES = {
     "open3d": ("sfm_front.viewers.open3d_loader",),
     "viser": (),
     "matplotlib": ("sfm_front.evaluation",),
+    "pyproj": ("sfm_front.photos.crs",),
     "watchfiles": ("sfm_front.photos.folder_changes",),
 }
 
