@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from dataclasses import dataclass
 
 import pycolmap
@@ -78,3 +79,12 @@ def adjust_all(
         config.add_image(image_id)
     config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
     pycolmap.create_default_bundle_adjuster(adjustment, config, reconstruction).solve()
+
+
+def median_error(reconstruction: pycolmap.Reconstruction) -> float:
+    """Of the mean reprojection errors of its points, in pixels; 0 where there is no point.
+
+    Wrong matches move a mean.
+    """
+    errors = [float(point.error) for point in reconstruction.points3D.values()]
+    return statistics.median(errors) if errors else 0.0

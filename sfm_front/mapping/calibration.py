@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import copy
 import math
-import statistics
 from dataclasses import dataclass
 
 import pycolmap
 
 from sfm_front.errors import ConfigError
-from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, adjust_robustly
+from sfm_front.mapping.bundle_adjustment import (
+    RobustAdjustmentOptions,
+    adjust_robustly,
+    median_error,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +87,7 @@ def _is_better(
     camera_id: int,
     options: CalibrationOptions,
 ) -> bool:
-    if _median_error(moved) > (1 - options.min_gain) * _median_error(fixed):
+    if median_error(moved) > (1 - options.min_gain) * median_error(fixed):
         return False
     camera = moved.camera(camera_id)
     shift_px = math.dist(
@@ -92,9 +95,3 @@ def _is_better(
         (camera.width / 2, camera.height / 2),
     )
     return shift_px <= options.max_shift * max(camera.width, camera.height)
-
-
-def _median_error(reconstruction: pycolmap.Reconstruction) -> float:
-    """Of its points' mean reprojection errors; 0 where there is no point."""
-    errors = [float(point.error) for point in reconstruction.points3D.values()]
-    return statistics.median(errors) if errors else 0.0

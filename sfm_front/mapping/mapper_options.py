@@ -11,6 +11,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
 from sfm_front.mapping.calibration import CalibrationOptions
 from sfm_front.mapping.local_refinement import LocalRefinementOptions
+from sfm_front.mapping.position_priors import PriorOptions
 from sfm_front.mapping.refinement_schedule import ScheduleOptions
 
 # Trials are limited here, by the points a photo sees, not by pycolmap.
@@ -96,6 +97,8 @@ class MapperOptions:
     # The last adjustment; it takes threads, intrinsics and what counts as large from here.
     robust: RobustAdjustmentOptions = field(default_factory=RobustAdjustmentOptions)
     calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
+    # How far measured positions of the photos count.
+    priors: PriorOptions = field(default_factory=PriorOptions)
 
     def __post_init__(self) -> None:
         if self.retry_growth < 1:

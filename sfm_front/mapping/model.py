@@ -18,6 +18,7 @@ from sfm_front.mapping.carry_over import Before, carry_over
 from sfm_front.mapping.final_adjustment import final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
+from sfm_front.mapping.position_priors import PositionPriors, held_to_positions
 from sfm_front.mapping.refinement_schedule import RefinementSchedule
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import Float64Array
@@ -38,6 +39,8 @@ class ModelState:
     min_pose_inliers: int
     # False if it was grown with its camera fixed.
     refine_intrinsics: bool
+    # Whether its world is a frame of the earth.
+    is_georeferenced: bool = False
 
 
 class Model:
@@ -57,6 +60,8 @@ class Model:
         if one is given."""
         # 0 until whoever starts it gives it another.
         self.model_id = 0
+        self.is_georeferenced = False
+        self._priors: PositionPriors | None = None
         self._view_graph = view_graph
         self._options = options
         self.emit = emit
@@ -87,6 +92,7 @@ class Model:
             view_graph, options, emit=emit, adjuster=adjuster, reconstruction=reconstruction
         )
         model.model_id = state.model_id
+        model.is_georeferenced = state.is_georeferenced
         model._mapping = copy.deepcopy(model._mapping)
         model._mapping.abs_pose_min_num_inliers = state.min_pose_inliers
         model._schedule.refined(state.refined_images, state.refined_points)
@@ -102,6 +108,7 @@ class Model:
             refined_points=refined_points,
             min_pose_inliers=self._mapping.abs_pose_min_num_inliers,
             refine_intrinsics=self._options.refine_intrinsics,
+            is_georeferenced=self.is_georeferenced,
         )
 
     def succeeded_by(self, reconstruction: pycolmap.Reconstruction) -> Model:
@@ -244,6 +251,21 @@ class Model:
     def _is_settled(self) -> bool:
         return self._under_way is None and self._schedule.last[0] == self.num_registered
 
+    @property
+    def is_under_way(self) -> bool:
+        """Whether it is being refined in the background."""
+        return self._under_way is not None
+
+    def georeference(self, enu_from_world: pycolmap.Sim3d, priors: PositionPriors) -> None:
+        """Move the world to the frame of these positions, to which it is held from now on.
+
+        Not while it is being refined in the background: that would come back in the old frame.
+        """
+        assert not self.is_under_way
+        self.reconstruction.transform(enu_from_world)
+        self.is_georeferenced = True
+        self._priors = priors
+
     def only(self, image_ids: Collection[int]) -> Model:
         """A model of these of its photos, over the view graph as it is now."""
         reconstruction = copy.deepcopy(self.reconstruction)
@@ -263,6 +285,10 @@ class Model:
         self.reconstruction = final_adjustment(
             self.reconstruction, self._options.robust, self._options.calibration
         )
+        if self._priors is not None:
+            self.reconstruction = held_to_positions(
+                self.reconstruction, self._priors, self._options.robust, self._options.priors
+            )
         if not self.is_miscalibrated:
             for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
@@ -353,6 +379,7 @@ class Model:
             self._mapping,
             pipeline.get_global_bundle_adjustment(),
             self._triangulation,
+            normalize_reconstruction=not self.is_georeferenced,
         )
         seconds = time.perf_counter() - started
         self._note_refined()

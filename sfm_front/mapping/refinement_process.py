@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import pycolmap
 
 
-
 @dataclass(frozen=True, kw_only=True)
 class AdjustmentRequest:
     """Adjust the model in the folder ``model`` in place, with at most so many iterations.
