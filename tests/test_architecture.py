@@ -58,6 +58,7 @@ LIBRARIES = {
     "viser": (),
     "matplotlib": ("sfm_front.evaluation",),
     "watchfiles": ("sfm_front.photos.folder_changes",),
+    "pyproj": ("sfm_front.photos.crs",),
 }
 
 MAX_FILES_AT_ROOT = 12
