@@ -89,8 +89,9 @@ def _lines(file: Path) -> list[tuple[int, str]]:
         raise InputError(f"{file}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: not UTF-8 at byte {error.start}: save it as UTF-8") from None
-    numbered = enumerate(map(str.strip, text.splitlines()), start=1)
-    return [(number, line) for number, line in numbered if line and not line.startswith("#")]
+    numbered = enumerate(text.splitlines(), start=1)
+    # Not stripped: cells at the end may be empty.
+    return [(number, line) for number, line in numbered if line.strip() and line[0] != "#"]
 
 
 # --- the two forms -------------------------------------------------------------------------------
@@ -127,7 +128,8 @@ def _csv_rows(
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+    (cells,) = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
+    return [cell.strip() for cell in cells]
 
 
 def _columns(where: str, header: Sequence[str], has_crs: bool) -> dict[str, int]:

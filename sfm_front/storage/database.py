@@ -82,8 +82,9 @@ class PhotoDatabase(Closeable):
     ) -> None:
         """Write a photo, its camera and its pairs; if this raises, no row of the photo remains.
 
-        ``prior``: where it was taken, as COLMAP is told, if its altitude is known. It is not skipped
-        any more, if it was. Ids are those given. A frame has its image's id, a rig its camera's.
+        ``prior``: where it was taken; COLMAP is told if the altitude is known. The photo is not
+        skipped any more, if it was. Ids are those given. A frame has its image's id, a rig its
+        camera's.
         """
         with self._file.transaction():
             self._forget_skipped(photo.name)
