@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,6 +72,23 @@ def test_a_frozen_fix_is_left_out_altogether() -> None:
     assert left_out(positions) == dict.fromkeys(range(10, 16), LeftOut.FROZEN)
 
 
+def test_a_frozen_fix_may_have_altitudes_that_are_not() -> None:
+    """As of another sensor."""
+    positions = flight()
+    for i in range(10, 14):
+        positions[i] = replace(positions[10], altitude_m=580.0 + i % 3)
+    assert left_out(positions) == dict.fromkeys(range(10, 14), LeftOut.FROZEN)
+
+
+def test_a_fix_that_was_repeated_over_less_than_its_error_is_kept() -> None:
+    """As of a phone round a statue: 0.3 m are the last digit of its numbers."""
+    positions = [replace(position, horizontal_sigma_m=16.0) for position in flight(length_m=30)]
+    positions[10:13] = [positions[10]] * 3
+    assert left_out(positions) == {}
+    positions = [replace(position, horizontal_sigma_m=0.02) for position in positions]
+    assert left_out(positions) == dict.fromkeys(range(10, 13), LeftOut.FROZEN)
+
+
 def test_two_photos_of_one_place_are_nothing_unusual() -> None:
     positions = flight()
     positions[11] = positions[10]
@@ -96,7 +115,9 @@ def test_a_series_from_a_tripod_is_kept() -> None:
 
 
 def test_a_climb_on_the_spot_is_kept() -> None:
-    assert left_out([GeoPosition(47.0, 8.0, 500.0 + i) for i in range(20)]) == {}
+    climb = [GeoPosition(47.0, 8.0, 500.0 + i) for i in range(20)]
+    assert left_out(climb) == {}
+    assert left_out(flight() + climb) == {}
 
 
 @pytest.mark.parametrize("distance_m", [3e3, 6e4, 3e6])
