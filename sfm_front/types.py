@@ -79,12 +79,28 @@ class GeoPosition:
     horizontal_sigma_m: float | None = None
     vertical_sigma_m: float | None = None
 
+    @property
+    def is_fix(self) -> bool:
+        """False at latitude and longitude 0, which receivers without a fix write."""
+        return self.latitude_deg != 0 or self.longitude_deg != 0
+
+
+@dataclass(frozen=True, slots=True)
+class GimbalAngles:
+    """Where a drone's camera looked, in degrees, as DJI counts them: ``yaw_deg`` clockwise from
+    north, ``pitch_deg`` 0 at the horizon and -90 straight down, ``roll_deg`` about the axis."""
+
+    yaw_deg: float
+    pitch_deg: float
+    roll_deg: float
+
 
 @dataclass(frozen=True, slots=True)
 class Exif:
     """What the camera wrote about a photo; ``None`` or empty where it wrote nothing usable.
 
-    ``orientation`` is EXIF's 1 to 8; pixels are kept as stored, as COLMAP does.
+    ``orientation`` is EXIF's 1 to 8; pixels are kept as stored, as COLMAP does. ``position`` is as
+    written, also where it can be none: ``photos.position_checks`` looks at all of them together.
     """
 
     make: str = ""
@@ -94,6 +110,7 @@ class Exif:
     captured_at: datetime | None = None
     position: GeoPosition | None = None
     orientation: int = 1
+    gimbal: GimbalAngles | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

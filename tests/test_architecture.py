@@ -57,8 +57,8 @@ LIBRARIES = {
     "open3d": ("sfm_front.viewers.open3d_loader",),
     "viser": (),
     "matplotlib": ("sfm_front.evaluation",),
-    "pyproj": ("sfm_front.photos.crs",),
     "watchfiles": ("sfm_front.photos.folder_changes",),
+    "pyproj": ("sfm_front.photos.crs",),
 }
 
 MAX_FILES_AT_ROOT = 12

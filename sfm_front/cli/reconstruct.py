@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sfm_front.cli import arguments as shared
 from sfm_front.cli.progress import ProgressLine
@@ -115,6 +115,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cameras.add_argument("--camera-model", help="any of COLMAP's (default: SIMPLE_RADIAL)")
     cameras.add_argument(
         "--camera-params", metavar="F,CX,CY,…", help="known calibration, in COLMAP's order"
+    )
+    positions = parser.add_argument_group("positions")
+    positions.add_argument(
+        "--gps",
+        metavar="FILE",
+        help="positions of photos: CSV (name,lat,lon,alt[,h_acc,v_acc]) or ODM's geo.txt; photos "
+        "that it does not name keep those of their EXIF. off: none at all; exif (default)",
+    )
+    positions.add_argument(
+        "--gps-accuracy",
+        metavar="H[,V]",
+        help="their standard deviation in metres, horizontal and vertical (default: 5,10; without "
+        "V, twice H), where the file or the photo does not say it",
     )
     retrieval = parser.add_argument_group("retrieval")
     shared.add_retrieval(retrieval)
@@ -254,20 +267,26 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     cameras = {
         "mode": arguments.camera_mode,
         "model": arguments.camera_model,
-        "params": _numbers(arguments.camera_params),
+        "params": _numbers("--camera-params", arguments.camera_params),
     }
     given["cameras"] = replace(
         base.cameras, **{name: value for name, value in cameras.items() if value is not None}
     )
+    positions: dict[str, Any] = {} if arguments.gps is None else {"source": arguments.gps}
+    accuracy = _numbers("--gps-accuracy", arguments.gps_accuracy)
+    if accuracy is not None:
+        if len(accuracy) > 2:
+            raise ConfigError(f"--gps-accuracy takes one or two numbers, got {len(accuracy)}")
+        positions["horizontal_sigma_m"] = accuracy[0]
+        positions["vertical_sigma_m"] = accuracy[1] if len(accuracy) == 2 else 2 * accuracy[0]
+    given["positions"] = replace(base.positions, **positions)
     return replace(base, **given)
 
 
-def _numbers(text: str | None) -> tuple[float, ...] | None:
+def _numbers(argument: str, text: str | None) -> tuple[float, ...] | None:
     if text is None:
         return None
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise ConfigError(
-            f"--camera-params takes numbers separated by commas, got {text!r}"
-        ) from None
+        raise ConfigError(f"{argument} takes numbers separated by commas, got {text!r}") from None

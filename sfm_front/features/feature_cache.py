@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sfm_front.storage.array_files import ArrayFiles, Arrays
-from sfm_front.types import Exif, Features, Float32Array, GeoPosition
+from sfm_front.types import Exif, Features, Float32Array, GeoPosition, GimbalAngles
 
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom in pixels of the file."""
@@ -27,6 +27,7 @@ _DECISIVE_CODE = (
     "photos/decoding.py",
     "photos/exif.py",
     "photos/formats.py",
+    "photos/xmp.py",
     "features/colmap_sift.py",
     "features/sift.py",
     "features/global_descriptors/vlad.py",
@@ -167,6 +168,8 @@ def _unpacked(arrays: Arrays) -> CachedFeatures:
         exif["captured_at"] = datetime.fromisoformat(exif["captured_at"])
     if exif["position"] is not None:
         exif["position"] = GeoPosition(**exif["position"])
+    if exif["gimbal"] is not None:
+        exif["gimbal"] = GimbalAngles(**exif["gimbal"])
     keypoints, descriptors, colors = (
         _checked(arrays[name], dtype, columns)
         for name, dtype, columns in (

@@ -16,6 +16,14 @@ _UTM = re.compile(r"WGS[ _]?(?:19)?84\s*/?\s*UTM\s*(?:ZONE\s*)?(\d{1,2})\s*([NS]
 _MODERN_ELLIPSOIDS = ("WGS 84", "GRS 1980")
 
 
+_MEANT_AS_ONE = re.compile(r"EPSG:|WGS[ _]?84|\+proj=|\+init=", re.IGNORECASE)
+
+
+def looks_like_crs(line: str) -> bool:
+    """Whether a line of a file is meant as a reference system, known or not."""
+    return _MEANT_AS_ONE.match(line) is not None
+
+
 @dataclass(frozen=True, slots=True)
 class Crs:
     """A horizontal reference system; heights are kept as they are, whatever their datum.

@@ -1,4 +1,4 @@
-"""EXIF tags, however broken → Exif."""
+"""EXIF tags and XMP, however broken → Exif."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from PIL.Image import Image
 
 from sfm_front.photos.formats import format_of
 from sfm_front.photos.time_limit import READ_TIMEOUT_S, read_within
+from sfm_front.photos.xmp import Xmp, read_xmp
 from sfm_front.types import Exif, GeoPosition
 
 FULL_FRAME_DIAGONAL_MM = 43.27
@@ -46,13 +47,17 @@ def exif_of(image: Image) -> Exif:
     and the sensor size (pixel dimensions over focal plane resolution). EXIF's pixel dimensions are
     the camera's, so it also holds for photos that were reduced later; COLMAP's focal length in
     pixels is then too large by that factor.
+
+    ``position`` is EXIF's, but for the altitude that XMP may have; XMP's place counts where EXIF
+    has none. Its standard deviations are those of XMP, else EXIF's horizontal positioning error.
     """
+    xmp = read_xmp(image.info.get("xmp"))
     try:
         main = image.getexif()
         tags: dict[int, Any] = {**main, **main.get_ifd(_EXIF_IFD)}
-        gps = main.get_ifd(_GPS_IFD)
+        gps: Mapping[int, Any] = main.get_ifd(_GPS_IFD)
     except Exception:  # Pillow's parser raises anything on broken bytes.
-        return Exif()
+        tags, gps = {}, {}
     orientation = _integer(tags.get(0x0112))
     return Exif(
         make=_text(tags.get(0x010F)),
@@ -60,8 +65,9 @@ def exif_of(image: Image) -> Exif:
         focal_length_mm=_positive(tags.get(0x920A)),
         focal_length_35mm=_focal_length_35mm(tags, image.size),
         captured_at=_captured_at(tags),
-        position=_position(gps),
+        position=_position(gps, xmp),
         orientation=orientation if 1 <= orientation <= 8 else 1,
+        gimbal=xmp.gimbal,
     )
 
 
@@ -100,17 +106,32 @@ def _captured_at(tags: Mapping[int, Any]) -> datetime | None:
     return None
 
 
-def _position(gps: Mapping[int, Any]) -> GeoPosition | None:
+def _position(gps: Mapping[int, Any], xmp: Xmp) -> GeoPosition | None:
+    place = _place(gps) or xmp.place
+    if place is None:
+        return None
+    return GeoPosition(
+        *place,
+        # Where a drone does not know its altitude XMP says 0, and EXIF may know better.
+        altitude_m=xmp.altitude_m or _altitude(gps),
+        horizontal_sigma_m=xmp.horizontal_sigma_m or _positive(gps.get(0x001F)),
+        vertical_sigma_m=xmp.vertical_sigma_m,
+    )
+
+
+def _place(gps: Mapping[int, Any]) -> tuple[float, float] | None:
     latitude = _degrees(gps.get(2), negative=_text(gps.get(1)).upper().startswith("S"))
     longitude = _degrees(gps.get(4), negative=_text(gps.get(3)).upper().startswith("W"))
     if latitude is None or longitude is None or abs(latitude) > 90 or abs(longitude) > 180:
         return None
-    if latitude == 0 and longitude == 0:  # Receivers without a fix write this.
-        return None
+    return latitude, longitude
+
+
+def _altitude(gps: Mapping[int, Any]) -> float | None:
     altitude = _number(gps.get(6))
     if altitude is not None and gps.get(5) in (1, b"\x01"):  # Below sea level.
         altitude = -altitude
-    return GeoPosition(latitude, longitude, altitude)
+    return altitude
 
 
 def _degrees(parts: Any, *, negative: bool) -> float | None:

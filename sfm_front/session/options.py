@@ -14,6 +14,7 @@ from sfm_front.matching.guided_matching import GuidedOptions
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import VerificationOptions
 from sfm_front.photos.cameras import CameraOptions
+from sfm_front.photos.positions import PositionOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
@@ -71,6 +72,8 @@ class SessionOptions:
     seed: int = 0
     # Which photos share a camera.
     cameras: CameraOptions = field(default_factory=CameraOptions)
+    # Where photos were taken, and how exactly that is known.
+    positions: PositionOptions = field(default_factory=PositionOptions)
     # Which keypoints are found and kept. COLMAP's SIFT, on CUDA, takes max_features alone.
     sift: SiftOptions = field(default_factory=SiftOptions)
     # Which candidates the global vectors propose.

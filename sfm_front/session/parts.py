@@ -26,6 +26,7 @@ from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.session.photo_folders import PhotoFolders
+from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.second_look import SecondLook
 from sfm_front.session.snapshots import Snapshot
 from sfm_front.storage.database import DATABASE, PhotoDatabase
@@ -45,6 +46,7 @@ class SessionParts:
     atlas: Atlas
     restart: Restart
     second_look: SecondLook
+    positions: PhotoPositions
     report: RunReport
 
 
@@ -54,6 +56,7 @@ def open_parts(
     options: SessionOptions,
     device: str,
     descriptor: GlobalDescriptor,
+    positions: PhotoPositions,
     announcer: Announcer,
 ) -> SessionParts:
     """Make all parts; ``opened`` closes those that hold threads, processes or files."""
@@ -107,6 +110,7 @@ def open_parts(
         atlas=atlas,
         restart=Restart(atlas),
         second_look=second_look,
+        positions=positions,
         report=RunReport(),
     )
 
@@ -124,6 +128,7 @@ def restore(parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer
         image_id, camera = photo.image_id, cameras[photo.camera_id]
         keypoints, colors = database.keypoints(image_id)
         parts.catalog.restore(photo, camera, colors)
+        parts.positions.take(image_id, photo.name, photo.exif)
         parts.retriever.remember(image_id, photo.global_vector)
         parts.report.restore(photo)
         pairs = database.pairs(image_id)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from sfm_front.errors import InputError
+from sfm_front.photos.positions import PositionOptions
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import check_output_folder, holds_session
 from sfm_front.session.photo_folders import PhotoFolders
@@ -21,9 +22,20 @@ _OPTIONS = "options"
 _STATE = "state"
 _RUNNING, _FINISHED = "running", "finished"
 
-# These say how the work is done, not what comes out of it.
+_POSITIONS = "positions"
+# These say how the work is done, not what comes out of it. What comes of positions is computed
+# anew whenever a session goes on: no photo is stored with more than its own EXIF.
 _FREE = frozenset(
-    {"threads", "num_threads", "device", "weights", "text", "snapshot_seconds", "cache_mb"}
+    {
+        "threads",
+        "num_threads",
+        "device",
+        "weights",
+        "text",
+        "snapshot_seconds",
+        "cache_mb",
+        _POSITIONS,
+    }
 )
 
 
@@ -50,8 +62,10 @@ def check_options(database: PhotoDatabase, options: SessionOptions, output: Path
     return True
 
 
-def mark_running(database: PhotoDatabase) -> None:
-    """From here on, until it is finished, the session has to be gone on with."""
+def mark_running(database: PhotoDatabase, options: SessionOptions) -> None:
+    """From here on, until it is finished, the session has to be gone on with; with these options,
+    which ``check_options`` has let pass."""
+    database.remember(_OPTIONS, json.dumps(as_dict(options)))
     database.remember(_STATE, _RUNNING)
 
 
@@ -129,7 +143,8 @@ def nothing_to_do(
     *,
     append: bool,
 ) -> bool:
-    """Whether a finished session holds all these photos; asked before anything heavy is loaded.
+    """Whether a finished session holds all these photos, with these positions; asked before
+    anything heavy is loaded.
 
     Raises InputError if the session cannot be continued so, or another process writes to it.
     """
@@ -139,8 +154,16 @@ def nothing_to_do(
     with SessionLock(output), PhotoDatabase(output / DATABASE) as database:
         if not check_options(database, options, output) or not is_finished(database):
             return False
+        if _positions(database) != options.positions:
+            return False
         newcomers = Newcomers(database, folder, output, append=append)
         return next(newcomers.among(photos, lambda _: None), None) is None
+
+
+def _positions(database: PhotoDatabase) -> PositionOptions:
+    """The options of positions that a session was last gone on with."""
+    stored = json.loads(database.recall(_OPTIONS) or "{}")
+    return PositionOptions(**stored.get(_POSITIONS, {}))  # absent in those of earlier versions
 
 
 def _same(before: FileState, now: FileState) -> bool:

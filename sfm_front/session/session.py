@@ -35,6 +35,7 @@ from sfm_front.session.hints import hint
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import check_output_folder, open_output_folder
 from sfm_front.session.parts import open_parts, restore
+from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.resume import as_dict, check_options, mark_finished, mark_running
 from sfm_front.session.snapshots import Snapshots, read_snapshot
 from sfm_front.storage.database import PhotoDatabase
@@ -99,9 +100,9 @@ class Session(Closeable):
         session, as ``events.jsonl`` has them.
 
         Raises InputError if there is such a session and neither is wanted, if it was made with
-        other options, or if another process writes to it; ConfigError, WeightsError or
-        DependencyError if the global descriptor cannot be had. Nothing has been written or removed
-        then.
+        other options, if another process writes to it, or if the file of positions is no such;
+        ConfigError, WeightsError or DependencyError if the global descriptor cannot be had, or a
+        library that positions need. Nothing has been written or removed then.
         """
         self.options = options or SessionOptions()
         self.output = output
@@ -113,6 +114,7 @@ class Session(Closeable):
             vlad_weight=self.options.vlad_weight,
             device=device,
         )
+        positions = PhotoPositions(self.options.positions)
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         self._finished = False
         # Whether the models were settled since the last photo.
@@ -125,7 +127,7 @@ class Session(Closeable):
             lock = open_output_folder(output, overwrite=overwrite, resume=resume)
             opened.callback(lock.close)
             self._parts = open_parts(
-                opened, output, self.options, device, descriptor, self._announcer
+                opened, output, self.options, device, descriptor, positions, self._announcer
             )
             self._go_on(opened)
             self._opened = opened.pop_all()
@@ -146,7 +148,7 @@ class Session(Closeable):
         self._snapshots = Snapshots(self.output / "sparse", self.options.snapshot_seconds)
         self.num_restored = self.database.num_photos()
         self._announcer.tell(SessionStarted(VERSION, as_dict(self.options), self.num_restored))
-        mark_running(self.database)
+        mark_running(self.database, self.options)
         snapshot = read_snapshot(self.output / "sparse") if known else None
         restore(self._parts, snapshot, self._announcer)
 
@@ -235,6 +237,7 @@ class Session(Closeable):
                 for model in self._parts.atlas.models
             ]
         with clock.stage("export"):
+            self.database.write_priors(self._parts.positions.checked().usable)
             models = self._write_snapshot(final=True)
         waiting = self._parts.atlas.waiting
         summary = self._parts.report.finish(
@@ -312,7 +315,8 @@ class Session(Closeable):
         unranked = candidates[len(ranked) :]
         outcomes = self._outcomes([*ranked, *unranked], pairs, rejected)
         with clock.stage("store"):
-            parts.database.write(image_id, photo, view.camera, pairs, outcomes)
+            prior = parts.positions.take(image_id, photo.name, photo.exif)
+            parts.database.write(image_id, photo, view.camera, pairs, outcomes, prior=prior)
         with clock.stage("map"):
             keypoints = photo.features.keypoints
             parts.view_graph.add(image_id, photo.name, view.camera, keypoints, pairs)

@@ -47,7 +47,7 @@ def camera_rows(camera: pycolmap.Camera) -> Iterator[Row]:
 
 
 def photo_rows(image_id: int, photo: ExtractedPhoto, camera_id: int) -> Iterator[Row]:
-    """The image, the frame that has its id, its features, and a prior if EXIF has a position."""
+    """The image, the frame that has its id, and its features."""
     yield Row("images", {"image_id": image_id, "name": photo.name, "camera_id": camera_id})
     yield Row("frames", {"frame_id": image_id, "rig_id": camera_id})
     yield Row(
@@ -69,9 +69,6 @@ def photo_rows(image_id: int, photo: ExtractedPhoto, camera_id: int) -> Iterator
             **_matrix(photo.features.descriptors, np.uint8),
         },
     )
-    position = photo.exif.position
-    if position is not None and position.altitude_m is not None:
-        yield _prior_row(image_id, camera_id, position, position.altitude_m)
 
 
 def inlier_data(image_id1: int, image_id2: int, matches: Uint32Array) -> bytes:
@@ -157,20 +154,31 @@ def _inverted(geometry: pycolmap.TwoViewGeometry) -> pycolmap.TwoViewGeometry:
     return swapped
 
 
-def _prior_row(image_id: int, camera_id: int, position: GeoPosition, altitude_m: float) -> Row:
-    """COLMAP's WGS84 prior: latitude and longitude in degrees, altitude in metres.
+def prior_rows(image_id: int, camera_id: int, position: GeoPosition) -> Iterator[Row]:
+    """COLMAP's WGS84 prior: latitude and longitude in degrees, altitude in metres, and covariance
+    in metres of east, north and up: COLMAP turns the position into such a frame, and leaves the
+    covariance as it is. It is unknown where a standard deviation is.
 
-    A position without altitude has none: COLMAP turns all priors into NaN if the first has one.
+    A position without altitude has none, nor one without a fix: COLMAP turns all priors into NaN
+    if the first has no altitude, and puts its frame where the first is.
     """
-    place = (position.latitude_deg, position.longitude_deg, altitude_m)
-    return Row(
+    if position.altitude_m is None or not position.is_fix:
+        return
+    horizontal, vertical = position.horizontal_sigma_m, position.vertical_sigma_m
+    if horizontal is None or vertical is None:
+        covariance = _UNKNOWN_COVARIANCE
+    else:
+        covariance = np.diag(np.square((horizontal, horizontal, vertical)))
+    yield Row(
         "pose_priors",
         {
             "corr_data_id": image_id,
             "corr_sensor_id": camera_id,
             "corr_sensor_type": _CAMERA,
-            "position": _blob(place, np.float64),
-            "position_covariance": _blob(_UNKNOWN_COVARIANCE, np.float64),
+            "position": _blob(
+                (position.latitude_deg, position.longitude_deg, position.altitude_m), np.float64
+            ),
+            "position_covariance": _blob(covariance, np.float64),
             "gravity": _blob(_UNKNOWN_GRAVITY, np.float64),
             "coordinate_system": int(pycolmap.PosePriorCoordinateSystem.WGS84),
         },

@@ -19,6 +19,7 @@ from sfm_front.storage.colmap_rows import (
     inlier_data,
     pair_rows,
     photo_rows,
+    prior_rows,
     read_camera,
     read_pair,
 )
@@ -39,6 +40,7 @@ from sfm_front.types import (
     Features,
     FileState,
     Float32Array,
+    GeoPosition,
     PairGeometry,
     Skipped,
     StoredPhoto,
@@ -76,11 +78,13 @@ class PhotoDatabase(Closeable):
         camera: pycolmap.Camera,
         pairs: Sequence[PairGeometry],
         candidates: Sequence[CandidateOutcome] = (),
+        prior: GeoPosition | None = None,
     ) -> None:
         """Write a photo, its camera and its pairs; if this raises, no row of the photo remains.
 
-        It is not skipped any more, if it was. Ids are those given. A frame has its image's id, a
-        rig its camera's.
+        ``prior``: where it was taken; COLMAP is told if the altitude is known. The photo is not
+        skipped any more, if it was. Ids are those given. A frame has its image's id, a rig its
+        camera's.
         """
         with self._file.transaction():
             self._forget_skipped(photo.name)
@@ -88,8 +92,20 @@ class PhotoDatabase(Closeable):
                 self._file.insert(row)
             for row in photo_rows(image_id, photo, camera.camera_id):
                 self._file.insert(row)
+            if prior is not None:
+                for row in prior_rows(image_id, camera.camera_id, prior):
+                    self._file.insert(row)
             self._insert_pairs(pairs)
             self._file.insert(photo_row(image_id, photo, candidates))
+
+    def write_priors(self, priors: Mapping[int, GeoPosition]) -> None:
+        """Replace the priors of all photos by these, by image id, if their altitude is known."""
+        with self._file.transaction():
+            self._file.execute("DELETE FROM pose_priors")
+            for image_id, camera_id in self._file.rows("SELECT image_id, camera_id FROM images"):
+                if image_id in priors:
+                    for row in prior_rows(image_id, camera_id, priors[image_id]):
+                        self._file.insert(row)
 
     def write_pairs(self, pairs: Sequence[PairGeometry]) -> None:
         """Write pairs of photos that are there, found later: all of them, or none."""

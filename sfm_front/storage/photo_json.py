@@ -2,35 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from datetime import datetime
 from typing import Any
 
-from sfm_front.types import CandidateOutcome, Exif, GeoPosition, Rejected, Rejection
+from sfm_front.types import (
+    CandidateOutcome,
+    Exif,
+    GeoPosition,
+    GimbalAngles,
+    Rejected,
+    Rejection,
+)
 
 
 def exif_row(exif: Exif) -> dict[str, Any]:
     """EXIF as JSON has it."""
-    position = exif.position
     return {
         "make": exif.make,
         "model": exif.model,
         "focal_length_mm": exif.focal_length_mm,
         "focal_length_35mm": exif.focal_length_35mm,
         "captured_at": exif.captured_at and exif.captured_at.isoformat(),
-        "position": position
-        and [position.latitude_deg, position.longitude_deg, position.altitude_m],
+        "position": exif.position and list(astuple(exif.position)),
         "orientation": exif.orientation,
+        "gimbal": exif.gimbal and list(astuple(exif.gimbal)),
     }
 
 
 def exif_of_row(row: dict[str, Any]) -> Exif:
     """Back from ``exif_row``."""
     captured_at, position = row["captured_at"], row["position"]
+    gimbal = row.get("gimbal")  # absent in files of earlier versions, as are the sigmas
     return Exif(
         **{
             **row,
             "captured_at": captured_at and datetime.fromisoformat(captured_at),
             "position": position and GeoPosition(*position),
+            "gimbal": gimbal and GimbalAngles(*gimbal),
         }
     )
 

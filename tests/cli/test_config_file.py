@@ -20,6 +20,7 @@ from sfm_front.mapping.mapper_options import InitialPairConstraints
 from sfm_front.matching.guided_matching import GuidedOptions
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.photos.cameras import CameraOptions
+from sfm_front.photos.positions import PositionOptions
 from sfm_front.session.options import SessionOptions
 
 if sys.version_info >= (3, 11):
@@ -45,6 +46,7 @@ CHANGED = {
         seed=9,
         weights=Path('süd flug ✈ 🛩/a "b" c\\d\t\n\x7f.pth'),
         cameras=CameraOptions(mode="single", params=(1e3, 500.25, 1e-7, 0.0)),
+        positions=PositionOptions(source="süd/geo.txt", horizontal_sigma_m=0.02),
     ),
     "numbers TOML spells apart": SessionOptions(
         matching=MatchingOptions(max_angle_rad=1e22),
@@ -278,11 +280,13 @@ def test_flags_win_over_the_file_and_leave_the_rest(capsys, tmp_path, file):
         "[retrieval]\ncandidates = 3\nnum_expansion = 2\n"
         "[pair_matching]\nnum_matched = 5\nnum_matched_first = 4\n"
         '[cameras]\nmode = "single"\nmodel = "PINHOLE"\n'
+        '[positions]\nsource = "off"\nvertical_sigma_m = 7\n'
     )
     of_file = read_options(file)
     flags = (
         *("--max-features", 12, "--seed", 0, "--no-text", "--candidates", 6),
         *("--num-matched", 7, "--camera-mode", "per-image"),
+        *("--gps", "geo.txt"),
     )
     assert printed(capsys, tmp_path, "--config", file, *flags) == replace(
         of_file,
@@ -292,7 +296,29 @@ def test_flags_win_over_the_file_and_leave_the_rest(capsys, tmp_path, file):
         retrieval=replace(of_file.retrieval, candidates=6),
         pair_matching=replace(of_file.pair_matching, num_matched=7),
         cameras=CameraOptions(mode="per-image", model="PINHOLE"),
+        positions=PositionOptions(source="geo.txt", vertical_sigma_m=7.0),
     )
+
+
+@pytest.mark.parametrize(("given", "vertical_m"), [("0.5", 1.0), ("0.5,3", 3.0)])
+def test_the_accuracy_of_positions_is_one_number_or_two(capsys, tmp_path, given, vertical_m):
+    positions = PositionOptions(horizontal_sigma_m=0.5, vertical_sigma_m=vertical_m)
+    assert printed(capsys, tmp_path, "--gps-accuracy", given) == replace(
+        DEFAULT, positions=positions
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("5,10,15", "--gps-accuracy takes one or two numbers, got 3"),
+        ("5m", "--gps-accuracy takes numbers separated by commas, got '5m'"),
+        ("0", "horizontal_sigma_m must be a number of metres above 0, got 0.0"),
+    ],
+)
+def test_an_accuracy_that_cannot_be_is_one_line_and_status_2(capsys, given, message):
+    assert main(["reconstruct", "--print-config", "--gps-accuracy", given]) == 2
+    assert capsys.readouterr() == ("", f"sfm-front reconstruct: {message}\n")
 
 
 def test_a_mistake_in_the_file_is_one_line_and_status_2(capsys, tmp_path, file):

@@ -18,7 +18,7 @@ from sfm_front.features.global_descriptors.descriptor import VLAD_WEIGHT, Global
 from sfm_front.features.global_descriptors.vlad import Vlad
 from sfm_front.features.sift import SiftExtractor, SiftOptions
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.types import Exif, GeoPosition, PhotoPath, Skipped, SkipReason
+from sfm_front.types import Exif, GeoPosition, GimbalAngles, PhotoPath, Skipped, SkipReason
 
 SUBPIXEL_PX = 0.6
 VECTOR_TOLERANCE = 1e-6  # float32
@@ -237,8 +237,9 @@ def test_what_a_camera_wrote_comes_back(tmp_path, photo):
         model="Ikon",
         focal_length_mm=24.5,
         captured_at=datetime(2020, 2, 29, 12, 30, 1),
-        position=GeoPosition(48.2, 16.4, None),
+        position=GeoPosition(48.2, 16.4, None, 0.02),
         orientation=6,
+        gimbal=GimbalAngles(12.5, -90.0, 0.0),
     )
     features = Setup(tmp_path).describer.describe(photo).photo.features
     files.save_local("a" * 32, CachedFeatures(320, 240, exif, features))

@@ -4,7 +4,7 @@ import warnings
 import pytest
 
 from sfm_front.errors import DependencyError, InputError
-from sfm_front.photos.crs import Crs
+from sfm_front.photos.crs import Crs, looks_like_crs
 from sfm_front.types import GeoPosition
 
 
@@ -92,3 +92,10 @@ class TestWithPyproj:
         with pytest.raises(InputError, match=r"Known are EPSG:4326") as caught:
             Crs.parse(text)
         assert "\n" not in str(caught.value)
+
+
+def test_a_line_that_is_meant_as_one_is_told_from_others() -> None:
+    for line in ("EPSG:4326", "epsg:1", "WGS84 UTM 32N", "WGS 84", "+proj=utm +zone=1"):
+        assert looks_like_crs(line)
+    for line in ("name,lat,lon", "a.jpg 8 47", "image x y"):
+        assert not looks_like_crs(line)

@@ -100,12 +100,23 @@ def test_an_impossible_position_is_none(tmp_path: Path, tag: int, value: Any) ->
     assert with_exif(tmp_path, {}, gps={**GPS, tag: value}).position is None
 
 
-def test_null_island_is_no_position_but_the_equator_is_one(tmp_path: Path) -> None:
+def test_null_island_is_no_fix_but_the_equator_is_one(tmp_path: Path) -> None:
     zero = (0.0, 0.0, 0.0)
-    assert with_exif(tmp_path, {}, gps={**GPS, 2: zero, 4: zero}).position is None
+    nowhere = with_exif(tmp_path, {}, gps={**GPS, 2: zero, 4: zero}).position
+    assert nowhere is not None
+    assert not nowhere.is_fix
     equator = with_exif(tmp_path, {}, gps={**GPS, 2: zero}).position
     assert equator is not None
     assert equator.latitude_deg == 0
+    assert equator.is_fix
+
+
+def test_a_phone_says_how_exact_its_position_is(tmp_path: Path) -> None:
+    for written, sigma in ((4.75, 4.75), (0.0, None), (IFDRational(1, 0), None)):
+        position = with_exif(tmp_path, {}, gps={**GPS, 0x001F: written}).position
+        assert position is not None
+        assert position.horizontal_sigma_m == sigma
+        assert position.vertical_sigma_m is None
 
 
 def test_a_position_without_altitude_has_none(tmp_path: Path) -> None:

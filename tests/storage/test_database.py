@@ -46,12 +46,12 @@ def database(orbit, tmp_path):
     params = [300, 310, 200, 150, 0.1, 0, 0, 0]
     other = pycolmap.Camera(camera_id=5, model="OPENCV", width=400, height=300, params=params)
     other.has_prior_focal_length = True
-    position = GeoPosition(47.5, -8.25, 512.0)
+    prior = GeoPosition(47.5, -8.25, 512.0, 2.0, 5.0)
     with PhotoDatabase(file) as store:
         store.write(1, described(orbit, 0), orbit.camera, [])
         store.write(2, described(orbit, 1), orbit.camera, [true_pair(orbit, 1, 0, (2, 1))])
-        photo = replace(described(orbit, 2, prefix="süd flug/"), exif=Exif(position=position))
-        store.write(3, photo, other, [true_pair(orbit, 2, 0, (3, 1))])
+        photo = described(orbit, 2, prefix="süd flug/")
+        store.write(3, photo, other, [true_pair(orbit, 2, 0, (3, 1))], prior=prior)
     opened = pycolmap.Database.open(file)
     yield opened
     opened.close()
@@ -133,16 +133,9 @@ def test_gps_is_a_wgs84_prior_of_its_photo_alone(database):
     np.testing.assert_array_equal(prior.position.ravel(), [47.5, -8.25, 512.0])
 
 
-def test_a_position_without_altitude_spoils_no_other(orbit, tmp_path):
-    """COLMAP would turn all priors into NaN if the first had no altitude."""
-    positions = [GeoPosition(10.0, 20.0), GeoPosition(10.0, 20.0, 30.0)]
-    with PhotoDatabase(tmp_path / "database.db") as database:
-        for image_id, position in enumerate(positions, 1):
-            photo = replace(described(orbit, image_id - 1), exif=Exif(position=position))
-            database.write(image_id, photo, orbit.camera, [])
-    with pycolmap.Database.open(tmp_path / "database.db") as opened:
-        (prior,) = opened.read_all_pose_priors()
-    assert prior.position.ravel().tolist() == [10.0, 20.0, 30.0]
+def test_a_prior_has_the_variances_of_its_position(database):
+    (prior,) = database.read_all_pose_priors()
+    np.testing.assert_array_equal(prior.position_covariance, np.diag([4.0, 4.0, 25.0]))
 
 
 def test_pairs_may_come_after_their_photos(orbit, tmp_path):
@@ -276,15 +269,15 @@ def rows_of(file) -> dict[str, list[tuple[object, ...]]]:
 
 def test_rows_are_those_that_pycolmap_writes(orbit, tmp_path):
     """To the bit, in every table and column: COLMAP's format is COLMAP's to define."""
-    position = GeoPosition(47.5, -8.25, 512.0)
-    photos = [replace(described(orbit, index), exif=Exif(position=position)) for index in range(3)]
+    position = GeoPosition(47.5, -8.25, 512.0, 0.5, 2.0)
+    photos = [described(orbit, index) for index in range(3)]
     camera = orbit.camera
     pairs = {2: [true_pair(orbit, 1, 0, (2, 1))], 3: [true_pair(orbit, 2, 1, (3, 2))]}
     matrix = np.arange(9.0).reshape(3, 3) + np.eye(3)
     pairs[3][0].two_view_geometry.F = pairs[3][0].two_view_geometry.H = matrix
     with PhotoDatabase(tmp_path / "ours.db") as store:
         for image_id, photo in enumerate(photos, 1):
-            store.write(image_id, photo, camera, pairs.get(image_id, []))
+            store.write(image_id, photo, camera, pairs.get(image_id, []), prior=position)
     with pycolmap.Database.open(tmp_path / "theirs.db") as database:
         database.write_camera(camera, use_camera_id=True)
         database.write_rig(trivial_rig(camera), use_rig_id=True)
@@ -301,6 +294,7 @@ def test_rows_are_those_that_pycolmap_writes(orbit, tmp_path):
             prior.corr_data_id = image.data_id
             prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.WGS84
             prior.position = np.array([47.5, -8.25, 512.0])
+            prior.position_covariance = np.diag([0.25, 0.25, 4.0])
             database.write_pose_prior(prior)
             for pair in pairs.get(image_id, []):
                 ids = pair.image_id1, pair.image_id2

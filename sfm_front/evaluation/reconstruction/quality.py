@@ -107,4 +107,6 @@ def _gps_residual_m(
     largest = max(models, key=lambda model: model.num_reg_images())
     names = [largest.images[image_id].name for image_id in largest.reg_image_ids()]
     positions = {name: read_exif(scene.photos / name).position for name in names}
-    return gps_residual_m(largest, {name: p for name, p in positions.items() if p is not None})
+    return gps_residual_m(
+        largest, {name: p for name, p in positions.items() if p is not None and p.is_fix}
+    )
