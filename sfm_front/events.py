@@ -163,6 +163,33 @@ class LookedAgain:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Georeferenced:
+    """Positions say where a model stands on the earth, or how well that is known has changed.
+
+    ``state``: none, provisional or metric; a metric model is in ENU from here on, ``origin`` its
+    latitude and longitude in degrees and altitude in metres. ``num_used`` of ``num_positions`` are
+    right. ``scale_sigma``: standard deviation of the scale, as a share of it; None without a scale.
+    ``reasons``: why it is no better.
+    """
+
+    model_id: int
+    state: str
+    origin: tuple[float, float, float] | None
+    num_used: int
+    num_positions: int
+    scale_sigma: float | None
+    reasons: tuple[str, ...]
+
+    def __str__(self) -> str:
+        scale = "" if self.scale_sigma is None else f", scale within {self.scale_sigma:.1%}"
+        why = "".join(f"; {reason}" for reason in self.reasons)
+        return (
+            f"model {self.model_id} is {self.state} by {self.num_used} of {self.num_positions} "
+            f"positions{scale}{why}"
+        )
+
+
 ModelEvent: TypeAlias = (
     ModelStarted
     | ModelDropped
@@ -171,6 +198,7 @@ ModelEvent: TypeAlias = (
     | LookAlikesRefused
     | RegisteredStructureLess
     | LookedAgain
+    | Georeferenced
 )
 
 

@@ -129,6 +129,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="their standard deviation in metres, horizontal and vertical (default: 5,10; without "
         "V, twice H), where the file or the photo does not say it",
     )
+    positions.add_argument(
+        "--georegister",
+        choices=("auto", "off"),
+        help="auto (default): models are in metres, east, north and up, as soon as positions fix "
+        "that; off: they stay in a frame of their own",
+    )
     retrieval = parser.add_argument_group("retrieval")
     shared.add_retrieval(retrieval)
     retrieval.add_argument(

@@ -14,6 +14,7 @@ import numpy as np
 import pycolmap
 
 from sfm_front.errors import StorageError
+from sfm_front.georeference.sidecar import FILE_NAME, Sidecar, write_sidecar
 from sfm_front.storage.atomic import sync
 from sfm_front.storage.json_files import write_json
 from sfm_front.types import ModelSummary, Uint8Array
@@ -40,12 +41,14 @@ def export_models(
     text: bool = False,
     point_clouds: bool = True,
     state: Mapping[str, object] | None = None,
+    sidecar: Sidecar | None = None,
 ) -> list[ModelSummary]:
     """Colour models and write them to ``folder/0``, ``folder/1``, … in the order given.
 
     ``colors``: image id → (N, 3) uint8 RGB of its keypoints; None if the points have their colours
     already. ``text`` adds COLMAP's text form,
-    ``point_clouds`` PLY files, ``state`` a JSON file with this content and the files' sizes. A
+    ``point_clouds`` PLY files, ``state`` a JSON file with this content and the files' sizes,
+    ``sidecar`` a ``georeference.json``. A
     model with a photo whose name text cannot keep gets no text: a warning names the photo.
     Everything is written beside ``folder`` first, synced, and then moved into place, so that a
     crash leaves either the models that were there or the new ones, never a part. If it happens
@@ -53,7 +56,7 @@ def export_models(
     full or cannot be written to; the models that were there stay.
     """
     try:
-        return _export(reconstructions, colors, folder, text, point_clouds, state)
+        return _export(reconstructions, colors, folder, text, point_clouds, state, sidecar)
     except OSError as error:
         raise StorageError(
             f"{folder}: models cannot be written ({error.strerror or error})."
@@ -78,6 +81,7 @@ def _export(
     text: bool,
     point_clouds: bool,
     state: Mapping[str, object] | None,
+    sidecar: Sidecar | None,
 ) -> list[ModelSummary]:
     fresh, _ = _beside(folder)
     shutil.rmtree(fresh, ignore_errors=True)
@@ -104,6 +108,8 @@ def _export(
                 mean_track_length=float(reconstruction.compute_mean_track_length()),
             )
         )
+    if sidecar is not None:
+        write_sidecar(fresh / FILE_NAME, sidecar)
     if state is not None:
         write_json(fresh / STATE, {**state, "files": _file_sizes(fresh)})
     _sync_all(fresh)

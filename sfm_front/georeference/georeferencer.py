@@ -17,6 +17,7 @@ from sfm_front.georeference.anchors import Anchors, camera_centres
 from sfm_front.georeference.consensus import Floor, agreeing
 from sfm_front.georeference.fixes import Fixes
 from sfm_front.georeference.spread import GeoreferenceState, SpreadOptions, Verdict, judge
+from sfm_front.mapping.position_priors import PositionPriors
 from sfm_front.types import GeoPosition
 
 # A new estimate contradicts what was said if half the cameras move further than so many standard
@@ -24,6 +25,8 @@ from sfm_front.types import GeoPosition
 _CONTRADICTION = 3.0
 # Cameras that must have been there before.
 _MIN_COMMON = 3
+# Standard deviation of a height that is not known, where a number is asked for.
+_UNKNOWN_M = 1e5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,16 +48,33 @@ class Georeference:
     """Where a model stands on the earth.
 
     ``frame``: None until a model was aligned. ``alignment``: of the model as it was given, None in
-    state NONE; its rows belong to the photos ``image_ids``. ``reasons``: as in ``Verdict``.
+    state NONE; its rows, and those of ``fixes``, belong to the photos ``image_ids``. ``reasons``:
+    as in ``Verdict``.
     ``held``: the newest estimate is not taken, and the reason says why; the frame is where it was.
     """
 
     state: GeoreferenceState = GeoreferenceState.NONE
     frame: LocalFrame | None = None
     alignment: Alignment | None = None
+    fixes: Fixes | None = None
     image_ids: tuple[int, ...] = ()
     reasons: tuple[str, ...] = ()
     held: bool = False
+
+    @property
+    def priors(self) -> PositionPriors:
+        """The positions that are right, in ENU: heights as if all flights began at one, standard
+        deviations as large as the residuals say. None before there is an alignment."""
+        alignment, fixes = self.alignment, self.fixes
+        if alignment is None or fixes is None:
+            return PositionPriors({}, {})
+        sigmas = np.sqrt(alignment.floor.variances(fixes))
+        raised = fixes.raised(alignment.height_offsets)
+        rows = np.flatnonzero(alignment.inliers).tolist()
+        return PositionPriors(
+            {self.image_ids[row]: raised.enu[row] for row in rows},
+            {self.image_ids[row]: np.minimum(sigmas[row], _UNKNOWN_M) for row in rows},
+        )
 
 
 class Georeferencer:
@@ -76,11 +96,23 @@ class Georeferencer:
         cam_from_model: Mapping[int, pycolmap.Rigid3d],
         positions: Mapping[int, PhotoPosition],
     ) -> Georeference:
-        """The georeference of a model.
+        """The georeference of the model that the frame is held by, the largest.
 
         ``cam_from_model``: poses of its cameras as they were held (turned by EXIF's orientation)
         by image id, in any frame. ``positions`` by image id, of these and other photos.
         """
+        found = self.look_at(cam_from_model, positions)
+        alignment = found.alignment
+        if alignment and found.state is GeoreferenceState.METRIC and not found.held:
+            self._anchors = Anchors.of(alignment, cam_from_model)
+        return found
+
+    def look_at(
+        self,
+        cam_from_model: Mapping[int, pycolmap.Rigid3d],
+        positions: Mapping[int, PhotoPosition],
+    ) -> Georeference:
+        """The same of any model: nothing is remembered but the frame, if it is the first."""
         ids = [image_id for image_id in cam_from_model if image_id in positions]
         ids.sort(key=lambda image_id: _order(image_id, positions[image_id]))
         found = [positions[image_id] for image_id in ids]
@@ -104,12 +136,11 @@ class Georeferencer:
             if refused:
                 alignment = _held(self._anchors, alignment, cam_from_model, common, poses, fixes)
                 verdict = Verdict(GeoreferenceState.METRIC, (refused,))
-        if alignment is not None and verdict.state is GeoreferenceState.METRIC and not refused:
-            self._anchors = Anchors.of(alignment, cam_from_model)
         return Georeference(
             state=verdict.state,
             frame=self._frame,
             alignment=alignment,
+            fixes=fixes,
             image_ids=tuple(ids),
             reasons=verdict.reasons,
             held=bool(refused),

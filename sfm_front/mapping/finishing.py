@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from sfm_front.events import DropReason, RegisteredStructureLess, StartKind
@@ -13,18 +13,23 @@ from sfm_front.mapping.restart import Restart
 from sfm_front.mapping.unfolding import unfold
 
 
-def finish(atlas: Atlas, restart: Restart | None = None) -> None:
+def finish(
+    atlas: Atlas,
+    restart: Restart | None = None,
+    before_last: Callable[[], None] = lambda: None,
+) -> None:
     """Retry what waits, restart where the stream began badly, refine everything.
 
-    ``restart``: the one that may be under way. The models of the atlas cannot grow any more after
-    this.
+    ``restart``: the one that may be under way. ``before_last`` is called before the last adjustment
+    of the models. They cannot grow any more after this.
     """
-    _Finishing(atlas, restart or Restart(atlas)).run()
+    _Finishing(atlas, restart or Restart(atlas), before_last).run()
 
 
 class _Finishing:
-    def __init__(self, atlas: Atlas, restart: Restart) -> None:
+    def __init__(self, atlas: Atlas, restart: Restart, before_last: Callable[[], None]) -> None:
         self._atlas = atlas
+        self._before_last = before_last
         self._view_graph = atlas.view_graph
         self._options = atlas.options
         self._initializer = atlas.initializer
@@ -45,6 +50,7 @@ class _Finishing:
                 model.take_two_view_tracks()
             self._atlas.refine_until_stable()
             self._register_loose()
+        self._before_last()
         for model in self._atlas.models:
             model.finish()
         self._drop_without_pairs()

@@ -17,6 +17,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``look_alikes_refused`` | two groups of photos that were taken for one place |
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
 | ``looked_again`` | a poorly connected photo was matched with more: ``found`` overlap |
+| ``georeferenced`` | how far positions say where a model stands on the earth |
 | ``session_ended`` | ``finished``: whether all models are written |
 
 New fields and events leave the version as it is; readers pass over what they do not know.
@@ -36,6 +37,7 @@ from typing import IO, Any
 from sfm_front.errors import StorageError
 from sfm_front.events import (
     Event,
+    Georeferenced,
     LookAlikesRefused,
     LookedAgain,
     ModelDropped,
@@ -72,6 +74,7 @@ _NAMES: dict[type, str] = {
     LookAlikesRefused: "look_alikes_refused",
     RegisteredStructureLess: "registered_structure_less",
     LookedAgain: "looked_again",
+    Georeferenced: "georeferenced",
     SessionEnded: "session_ended",
 }
 

@@ -14,7 +14,7 @@ from sfm_front.matching.guided_matching import GuidedOptions
 from sfm_front.matching.nearest_neighbors import MatchingOptions
 from sfm_front.matching.verification import VerificationOptions
 from sfm_front.photos.cameras import CameraOptions
-from sfm_front.photos.positions import PositionOptions
+from sfm_front.photos.positions import OFF, PositionOptions
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.retrieval.rerank import RerankOptions
 from sfm_front.retrieval.retriever import RetrievalOptions
@@ -74,6 +74,9 @@ class SessionOptions:
     cameras: CameraOptions = field(default_factory=CameraOptions)
     # Where photos were taken, and how exactly that is known.
     positions: PositionOptions = field(default_factory=PositionOptions)
+    # Whether models are moved to where positions say they stand: auto, as soon as these fix it, or
+    # off.
+    georegister: str = AUTO
     # Which keypoints are found and kept. COLMAP's SIFT, on CUDA, takes max_features alone.
     sift: SiftOptions = field(default_factory=SiftOptions)
     # Which candidates the global vectors propose.
@@ -98,6 +101,8 @@ class SessionOptions:
     def __post_init__(self) -> None:
         if self.threads < 1:
             raise ConfigError(f"threads must be at least 1, got {self.threads}")
+        if self.georegister not in (AUTO, OFF):
+            raise ConfigError(f"georegister must be {AUTO} or {OFF}, got {self.georegister!r}")
         if self.snapshot_seconds <= 0:
             raise ConfigError(f"snapshot_seconds must be above 0, got {self.snapshot_seconds}")
         if self.cache_mb is not None and self.cache_mb < 1:

@@ -16,6 +16,7 @@ from sfm_front.matching.guided_matching import GuidedMatcher
 from sfm_front.matching.matcher import make_matcher
 from sfm_front.matching.verification import Verifier
 from sfm_front.photos.cameras import CameraCatalog
+from sfm_front.photos.positions import OFF
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.reports.run_report import RunReport
 from sfm_front.retrieval.rerank import Reranker
@@ -23,6 +24,7 @@ from sfm_front.retrieval.retriever import Retriever
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.announcer import Announcer
 from sfm_front.session.catalog import PhotoCatalog
+from sfm_front.session.georeferencing import Georeferencing
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.session.photo_folders import PhotoFolders
@@ -47,6 +49,7 @@ class SessionParts:
     restart: Restart
     second_look: SecondLook
     positions: PhotoPositions
+    georeferencing: Georeferencing
     report: RunReport
 
 
@@ -111,6 +114,12 @@ def open_parts(
         restart=Restart(atlas),
         second_look=second_look,
         positions=positions,
+        georeferencing=Georeferencing(
+            positions,
+            announcer.tell_of_model,
+            seed=options.seed,
+            is_on=options.georegister != OFF,
+        ),
         report=RunReport(),
     )
 
@@ -136,7 +145,11 @@ def restore(parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer
         parts.second_look.note(image_id, (pair.image_id2 for pair in pairs))
         if snapshot is not None and image_id == num_mapped:
             atlas.restore(snapshot.models)
+            if snapshot.georeferencing is not None:
+                parts.georeferencing.restore(snapshot.georeferencing)
         elif image_id > num_mapped:
-            announcer.tell_outcome(atlas, image_id, atlas.add(image_id))
+            placed = atlas.add(image_id)
+            parts.georeferencing.follow(atlas.models)
+            announcer.tell_outcome(atlas, image_id, placed)
     # Of earlier photos, whose reports are written.
     announcer.pop_model_events()

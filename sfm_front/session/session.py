@@ -180,6 +180,7 @@ class Session(Closeable):
         # The next photo must not be charged with them.
         self._idle_events += self._announcer.pop_model_events()
         if self._is_settled:
+            self._georeference()
             self._write_snapshot()
 
     def _settle(self) -> bool:
@@ -231,7 +232,10 @@ class Session(Closeable):
         with clock.stage("look again"):
             self._placing_more(self._parts.second_look.at_end)
         with clock.stage("finish"):
-            self._placing_more(lambda: finish(self._parts.atlas, self._parts.restart))
+            self._placing_more(
+                lambda: finish(self._parts.atlas, self._parts.restart, self._georeference)
+            )
+            self._georeference()
             audits = [
                 audit(model.reconstruction, self._parts.view_graph)
                 for model in self._parts.atlas.models
@@ -270,6 +274,9 @@ class Session(Closeable):
                 )
         self._opened.close()
 
+    def _georeference(self) -> None:
+        self._parts.georeferencing.settle(self._parts.atlas.models)
+
     def _hint(self, image_id: int) -> str:
         atlas = self._parts.atlas
         nearest = self._parts.retriever.nearest(image_id, self.options.second_look.candidates)
@@ -288,8 +295,16 @@ class Session(Closeable):
 
     def _write_snapshot(self, *, final: bool = False) -> list[ModelSummary]:
         catalog, text = self._parts.catalog, final and self.options.text
-        models = self._parts.atlas.models
-        return self._snapshots.write(models, len(catalog), catalog.colors, final=final, text=text)
+        models, georeferencing = self._parts.atlas.models, self._parts.georeferencing
+        return self._snapshots.write(
+            models,
+            len(catalog),
+            catalog.colors,
+            georeferencing.as_json(),
+            georeferencing.sidecar(models),
+            final=final,
+            text=text,
+        )
 
     def _add(self, photo: ExtractedPhoto) -> PhotoAdded | Skipped:
         """The method: retrieve, re-rank, match and verify, store, map, remember."""
@@ -321,6 +336,7 @@ class Session(Closeable):
             keypoints = photo.features.keypoints
             parts.view_graph.add(image_id, photo.name, view.camera, keypoints, pairs)
             registered = parts.atlas.add(image_id)
+            parts.georeferencing.follow(parts.atlas.models)
         parts.retriever.remember(image_id, photo.global_vector)
         events = self._announcer.pop_model_events()
         # Apart from the rest of mapping: it alone depends on how many photos came before.

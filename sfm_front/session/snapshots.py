@@ -20,6 +20,7 @@ from sfm_front.exporters.colmap import (
     export_models,
     recover_models,
 )
+from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.types import ModelSummary, Uint8Array
@@ -41,6 +42,8 @@ class Snapshot:
 
     num_photos: int
     models: tuple[tuple[pycolmap.Reconstruction, ModelState], ...]
+    # As ``Georeferencing.as_json`` gave it; None in those of earlier versions.
+    georeferencing: dict[str, Any] | None
 
 
 class Snapshots:
@@ -64,11 +67,15 @@ class Snapshots:
         models: Sequence[Model],
         num_photos: int,
         colors: Mapping[int, Uint8Array],
+        georeferencing: Mapping[str, Any],
+        sidecar: Sidecar | None,
         *,
         final: bool = False,
         text: bool = False,
     ) -> list[ModelSummary]:
         """Write all models, whole or not at all; ``final`` ones with their point clouds.
+
+        ``georeferencing``: as ``Georeferencing.as_json`` gives it.
 
         Raises StorageError if the disk is full, or the output was removed.
         """
@@ -92,7 +99,9 @@ class Snapshots:
                 "version": _VERSION,
                 "num_photos": num_photos,
                 "models": [asdict(model.state) for model in models],
+                "georeferencing": georeferencing,
             },
+            sidecar=sidecar,
         )
         now = time.monotonic()
         wanted_s = max(_FIRST_S, (now - self._began) * _SHARE_OF_AGE)
@@ -126,4 +135,4 @@ def read_snapshot(folder: Path) -> Snapshot | None:
     except (OSError, ValueError, KeyError, TypeError, InputError) as error:
         logger.warning("%s: models cannot be read (%s): growing them anew", folder, error)
         return None
-    return Snapshot(num_photos, models)
+    return Snapshot(num_photos, models, content.get("georeferencing"))

@@ -103,7 +103,7 @@ HEADER = "name,lat,lon,alt\n"
         (HEADER + "a.jpg,47,,1\n", ":2: x (or lon) is '', which is no number"),
         (HEADER + "a.jpg,47,8,nan\n", ":2: z (or alt) is 'nan', which is no number"),
         (HEADER + ",47,8,1\n", ":2: names no photo"),
-        (HEADER + "a.jpg,8,147,1\nb.jpg,147,8,1\n", ":3: latitude 147, longitude 8 is nowhere"),
+        (HEADER + "a.jpg,8,147,1\nb.jpg,147,8,1\n", ":3: (8, 147) is no place in EPSG:4326"),
         (HEADER + "a.jpg,1,2,3\nA.JPG,1,2,3\n", ":3: A.JPG stands in line 2 too"),
         ("name,lat,lon,h_acc\na.jpg,1,2,0\n", ":2: h_acc must be above 0 m, got 0"),
         ("EPSG:4326\na.jpg 8\n", ":2: has 1 numbers"),
