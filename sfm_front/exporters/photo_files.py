@@ -26,6 +26,7 @@ from sfm_front.exporters.undistortion import (
     target_camera,
 )
 from sfm_front.photos.decoding import Undecodable, decode
+from sfm_front.photos.formats import EXTENSIONS, format_of
 from sfm_front.runtime.thread_limits import limit_this_thread, single_threaded_calls
 from sfm_front.types import Float32Array, Uint8Array
 
@@ -118,16 +119,16 @@ class _PhotoMaker:
         except OSError as error:
             return f"cannot be read: {error.strerror}"
         camera, target = self._cameras[image.camera_id], self._targets[image.camera_id]
-        suffix = PurePosixPath(image.name).suffix
         file = self._job.folder / IMAGES / self._stems[image.name]
         if takes_same_photos(camera, target):
-            return self._hand_on(path, data, camera, file.with_suffix(suffix))
+            return self._hand_on(path, data, camera, file.with_suffix(_suffix(image.name, data)))
         pixels = decoded(data, camera, target)
         if isinstance(pixels, Undecodable):
             return _why(pixels)
         if isinstance(pixels, tuple):
             return _of_another_size(pixels, camera)
         pixels = resampled(pixels, self._source_pixels(image.camera_id))
+        suffix = _suffix(image.name, data)
         is_jpeg = suffix.lower() in _JPEG
         file = file.with_suffix(suffix if is_jpeg else ".png")
         file.write_bytes(_encoded(pixels, is_jpeg))
@@ -147,6 +148,15 @@ class _PhotoMaker:
 
     def _find_source_pixels(self, camera_id: int) -> Float32Array:
         return source_pixels(self._cameras[camera_id], self._targets[camera_id])
+
+
+def _suffix(name: str, data: bytes) -> str:
+    """That of the name if it is a photo's, else that of the content."""
+    suffix = PurePosixPath(name).suffix
+    if suffix.lower() in EXTENSIONS:
+        return suffix
+    image_format = format_of(data)
+    return "" if image_format is None else f".{image_format.name.lower()}"
 
 
 def _is_file(path: Path | None) -> bool:
@@ -206,8 +216,10 @@ def _move_cameras(model: pycolmap.Reconstruction, targets: Mapping[int, pycolmap
             if image.points2D[index].has_point3D():
                 model.delete_observation(image_id, index)
             image.points2D[index].xy = np.zeros(2)
-    for camera_id, target in targets.items():
-        camera = model.camera(camera_id)
+    # Cameras whose photos are elsewhere too: readers stop at any that they do not know.
+    some_target = next(iter(targets.values()))
+    for camera_id, camera in model.cameras.items():
+        target = targets.get(camera_id, some_target)
         camera.model = target.model
         camera.width, camera.height = target.width, target.height
         camera.params = list(target.params)

@@ -57,7 +57,9 @@ TARGETS = {
         "InterfaceCOLMAP -i {folder} -o {folder}/scene.mvs",
     ),
     "bundler": Target(
-        "bundler", "Bundler v0.3: bundle.out, list.txt, photos", "cd {folder} && Bundle2PMVS list.txt bundle.out"
+        "bundler",
+        "Bundler v0.3: bundle.out, list.txt, photos",
+        "cd {folder} && Bundle2PMVS list.txt bundle.out",
     ),
     "nvm": Target(
         "nvm",

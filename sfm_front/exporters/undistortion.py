@@ -17,7 +17,6 @@ from sfm_front.types import Float32Array, Float64Array, Uint8Array
 _ROWS_AT_ONCE = 64
 # Of a principal point: far below what anybody can see, far above rounding.
 _SAME_PX = 1e-6
-_NO_SECOND_MAP = np.empty(0, np.float32)
 
 
 class Projection(Enum):
@@ -112,10 +111,9 @@ def resampled(pixels: Uint8Array, fractions: Float32Array) -> Uint8Array:
     """The photo whose pixels lie at ``source_pixels``; black where there is nothing."""
     height, width = pixels.shape[:2]
     places = fractions * np.array([width, height], np.float32) - np.float32(0.5)
-    return np.asarray(
-        cv2.remap(pixels, places, _NO_SECOND_MAP, cv2.INTER_LINEAR),
-        dtype=np.uint8,
-    )
+    # OpenCV's stubs do not know that one map may hold both coordinates.
+    remapped = cv2.remap(pixels, places, None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
+    return np.asarray(remapped, dtype=np.uint8)
 
 
 def _pinhole(camera: pycolmap.Camera) -> pycolmap.Camera:
@@ -131,13 +129,12 @@ def _pinhole(camera: pycolmap.Camera) -> pycolmap.Camera:
                 camera.principal_point_y,
             ],
         )
-    try:
-        return pycolmap.undistort_camera(pycolmap.UndistortCameraOptions(), camera)
-    except (ValueError, RuntimeError) as error:
+    if not camera.is_perspective():
         raise InputError(
             f"camera {camera.camera_id}: {camera.model_name} cannot be undistorted to a pinhole "
             "camera, which this target needs; --to colmap-text, ply or csv does without"
-        ) from error
+        )
+    return pycolmap.undistort_camera(pycolmap.UndistortCameraOptions(), camera)
 
 
 def _crop_to_centre(camera: pycolmap.Camera) -> None:
