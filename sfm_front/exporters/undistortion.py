@@ -17,6 +17,7 @@ from sfm_front.types import Float32Array, Float64Array, Uint8Array
 _ROWS_AT_ONCE = 64
 # Of a principal point: far below what anybody can see, far above rounding.
 _SAME_PX = 1e-6
+_NOWHERE = -9.0
 
 
 class Projection(Enum):
@@ -79,8 +80,8 @@ def source_pixels(camera: pycolmap.Camera, target: pycolmap.Camera) -> Float32Ar
     """Where each pixel of a photo of ``target`` lies in one of ``camera``.
 
     (target height, target width, 2) x, y as a fraction of width and height, so that it holds for
-    photos that were decoded smaller; 0 is the outer edge of the first pixel. nan where ``camera``
-    does not see.
+    photos that were decoded smaller; 0 is the outer edge of the first pixel. Outside of it where
+    ``camera`` does not see.
     """
     fractions = np.empty((target.height, target.width, 2), np.float32)
     size = np.array([camera.width, camera.height], np.float64)
@@ -88,7 +89,8 @@ def source_pixels(camera: pycolmap.Camera, target: pycolmap.Camera) -> Float32Ar
         bottom = min(top + _ROWS_AT_ONCE, target.height)
         x, y = np.meshgrid(np.arange(target.width) + 0.5, np.arange(top, bottom) + 0.5)
         there = moved_points(np.column_stack([x.ravel(), y.ravel()]), target, camera)
-        fractions[top:bottom] = (there / size).reshape(bottom - top, target.width, 2)
+        seen = np.nan_to_num(there / size, nan=_NOWHERE)
+        fractions[top:bottom] = seen.reshape(bottom - top, target.width, 2)
     return fractions
 
 
@@ -117,6 +119,12 @@ def resampled(pixels: Uint8Array, fractions: Float32Array) -> Uint8Array:
 
 
 def _pinhole(camera: pycolmap.Camera) -> pycolmap.Camera:
+    # First: pycolmap 4.2 crashes when a panorama is asked for its focal length.
+    if not camera.is_perspective():
+        raise InputError(
+            f"camera {camera.camera_id}: {camera.model_name} cannot be undistorted to a pinhole "
+            "camera, which this target needs; --to colmap-text, ply or csv does without"
+        )
     if camera.is_undistorted():
         return pycolmap.Camera(
             model="PINHOLE",
@@ -128,11 +136,6 @@ def _pinhole(camera: pycolmap.Camera) -> pycolmap.Camera:
                 camera.principal_point_x,
                 camera.principal_point_y,
             ],
-        )
-    if not camera.is_perspective():
-        raise InputError(
-            f"camera {camera.camera_id}: {camera.model_name} cannot be undistorted to a pinhole "
-            "camera, which this target needs; --to colmap-text, ply or csv does without"
         )
     return pycolmap.undistort_camera(pycolmap.UndistortCameraOptions(), camera)
 

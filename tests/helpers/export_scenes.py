@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
-from helpers.model_building import looking
 from PIL import Image
 
+from helpers.model_building import looking
 from sfm_front.exporters.options import ExportOptions
 from sfm_front.exporters.scene import Job, Scene
 

@@ -46,7 +46,7 @@ def _pinhole(rotation, translation, fx, fy, cx, cy):
     return project
 
 
-# --- COLMAP's binary form, as Inria's colmap_loader.py takes it: bytes of names one by one ---------
+# --- COLMAP's binary form, as Inria's colmap_loader.py takes it: bytes of names one by one -------
 
 
 def read_splat_scene(folder: Path, *, centred: bool) -> list[ReadPhoto]:
@@ -98,7 +98,7 @@ def _unpack(file, kinds: str):
     return struct.unpack(f"<{kinds}", file.read(struct.calcsize(f"<{kinds}")))
 
 
-# --- COLMAP's text, as InterfaceCOLMAP.cpp takes it ------------------------------------------------
+# --- COLMAP's text, as InterfaceCOLMAP.cpp takes it ----------------------------------------------
 
 
 def read_openmvs_scene(folder: Path) -> list[ReadPhoto]:
@@ -134,7 +134,7 @@ def _lines(file: Path) -> Iterator[str]:
     return (line for line in file.read_text("utf-8").splitlines() if not line.startswith("#"))
 
 
-# --- Bundler v0.3 ----------------------------------------------------------------------------------
+# --- Bundler v0.3 --------------------------------------------------------------------------------
 
 
 def read_bundler_scene(folder: Path) -> list[ReadPhoto]:
@@ -182,7 +182,7 @@ def _take(numbers: Iterator[float], count: int) -> np.ndarray:
     return np.array([next(numbers) for _ in range(count)])
 
 
-# --- VisualSFM's NVM_V3 ----------------------------------------------------------------------------
+# --- VisualSFM's NVM_V3 --------------------------------------------------------------------------
 
 
 def read_nvm_scene(folder: Path) -> list[ReadPhoto]:
@@ -211,7 +211,7 @@ def read_nvm_scene(folder: Path) -> list[ReadPhoto]:
     return [photo for photo, _, _ in cameras]
 
 
-# --- nerfstudio ------------------------------------------------------------------------------------
+# --- nerfstudio ----------------------------------------------------------------------------------
 
 
 def read_nerfstudio_scene(folder: Path) -> list[ReadPhoto]:
