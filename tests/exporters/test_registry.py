@@ -113,8 +113,10 @@ def test_photos_that_nobody_knows_are_asked_for(output):
         export(output, "3dgs", images=output / "nowhere")
 
 
-def test_no_name_leads_out_of_the_folder_of_photos(output, tmp_path):
-    (tmp_path / "secret.png").write_bytes((tmp_path / "photos" / "a.png").read_bytes())
+def test_no_name_leads_out_of_the_folder_of_photos(tmp_path):
+    photos = write_photos(tmp_path / "photos", ("a.png", "secret.png"))
+    photos["a.png"].rename(tmp_path / "photos" / "a.png")
+    photos["secret.png"].rename(tmp_path / "secret.png")
     model_folder(tmp_path / "evil", exact_model(names=("../secret.png", "a.png")))
     exported = export(tmp_path / "evil", "nerfstudio", images=tmp_path / "photos")
     assert exported.num_photos == 1
