@@ -15,16 +15,19 @@ from sfm_front.cli.progress import CountLine
 from sfm_front.cli.signals import leaving_at_signal
 from sfm_front.exporters.registry import TARGETS, export
 
-_STOPPING = "stopping: nothing will be left behind; once more leaves at once"
+_EXIT_STATUS = """\
+exit status: 0 the folder was written, 2 a mistake in what was given, 130 stopped, and nothing is
+left behind. A second Ctrl-C, SIGTERM or SIGHUP leaves at once, and what was begun stays.
+"""
+_STOPPING = "stopping; once more leaves at once"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``export`` on ``parser``."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     width = max(map(len, TARGETS))
-    parser.epilog = "targets:\n" + "\n".join(
-        f"  {name:<{width}}  {target.summary}" for name, target in TARGETS.items()
-    )
+    targets = (f"  {name:<{width}}  {target.summary}\n" for name, target in TARGETS.items())
+    parser.epilog = f"targets:\n{''.join(targets)}\n{_EXIT_STATUS}"
     parser.add_argument(
         "source",
         type=Path,

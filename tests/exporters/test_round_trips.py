@@ -9,7 +9,6 @@ import pycolmap
 import pytest
 from helpers.export_scenes import LENSES, PLAIN, exact_model, job_of, write_photos
 from helpers.foreign_readers import (
-    largest_error_px,
     read_bundler_scene,
     read_nerfstudio_scene,
     read_nvm_scene,
@@ -53,7 +52,7 @@ def check(photos, count=3, tolerance_px=EXACT_PX):
     assert len(photos) == count
     for photo in photos:
         assert len(photo.seen) > 10
-        assert largest_error_px(photo) < tolerance_px
+        assert np.abs(photo.errors_px()).max() < tolerance_px
         size = Image.open(photo.file).size
         assert photo.size in (None, size)
 
@@ -82,7 +81,7 @@ def test_nerfstudio(tmp_path, photos, lens, max_size):
 
 def seen_in(model, image_id):
     points = (p for p in model.image(image_id).points2D if p.has_point3D())
-    return {tuple(model.point3D(p.point3D_id).xyz): p.xy for p in points}
+    return [(model.point3D(p.point3D_id).xyz, p.xy) for p in points]
 
 
 @pytest.mark.parametrize("lens", RADIAL)

@@ -17,18 +17,18 @@ import numpy as np
 
 @dataclass
 class ReadPhoto:
-    """``seen``: (3,) point as a tuple → (2,) pixel, from the photo's upper left corner, y down."""
+    """``seen``: (3,) points and the (2,) pixels that show them, from the photo's upper left corner,
+    y down; a photo may show a point twice."""
 
     file: Path
     project: Callable[[np.ndarray], np.ndarray]
     size: tuple[int, int] | None = None
-    seen: dict[tuple[float, ...], np.ndarray] = field(default_factory=dict)
+    seen: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
 
-
-def largest_error_px(photo: ReadPhoto) -> float:
-    """Between where points project and where they are seen."""
-    points = np.array(list(photo.seen))
-    return float(np.abs(photo.project(points) - np.array(list(photo.seen.values()))).max())
+    def errors_px(self) -> np.ndarray:
+        """(N, 2) where points project minus where they are seen."""
+        points, pixels = (np.array(values) for values in zip(*self.seen, strict=True))
+        return self.project(points) - pixels
 
 
 def rotation_of(quaternion: np.ndarray) -> np.ndarray:
@@ -77,12 +77,12 @@ def read_splat_scene(folder: Path, *, centred: bool) -> list[ReadPhoto]:
             values = _unpack(file, "ddq" * num)
             for x, y, point in zip(values[::3], values[1::3], values[2::3], strict=True):
                 if point != -1:
-                    photo.seen[points[point]] = np.array([x, y])
+                    photo.seen.append((points[point], np.array([x, y])))
             photos.append(photo)
     return photos
 
 
-def _read_points(file: Path) -> dict[int, tuple[float, ...]]:
+def _read_points(file: Path) -> dict[int, np.ndarray]:
     points = {}
     with file.open("rb") as stream:
         (count,) = _unpack(stream, "Q")
@@ -90,7 +90,7 @@ def _read_points(file: Path) -> dict[int, tuple[float, ...]]:
             point, *xyz = _unpack(stream, "QdddBBBd")[:4]
             (length,) = _unpack(stream, "Q")
             stream.read(8 * length)
-            points[point] = tuple(xyz)
+            points[point] = np.array(xyz)
     return points
 
 
@@ -113,7 +113,7 @@ def read_openmvs_scene(folder: Path) -> list[ReadPhoto]:
     for line in _lines(folder / "sparse" / "points3D.txt"):
         words = line.split()
         assert len(words) > 8, "a point without a track ends the reading"
-        points[int(words[0])] = tuple(map(float, words[1:4]))
+        points[int(words[0])] = np.array(words[1:4], float)
     lines = _lines(folder / "sparse" / "images.txt")
     photos = []
     for line in lines:
@@ -125,7 +125,7 @@ def read_openmvs_scene(folder: Path) -> list[ReadPhoto]:
         values = np.array(next(lines).split(), float).reshape(-1, 3)
         for x, y, point in values:
             if point != -1:
-                photo.seen[points[int(point)]] = np.array([x, y])
+                photo.seen.append((points[int(point)], np.array([x, y])))
         photos.append(photo)
     return photos
 
@@ -157,12 +157,12 @@ def read_bundler_scene(folder: Path) -> list[ReadPhoto]:
             ReadPhoto(file, _bundler_camera(rotation, translation, focal, k1, k2, size), size)
         )
     for _ in range(num_points):
-        point = tuple(_take(numbers, 3))
+        point = _take(numbers, 3)
         _take(numbers, 3)
         for _ in range(int(next(numbers))):
             camera, _, x, y = _take(numbers, 4)
             photo = photos[int(camera)]
-            photo.seen[point] = np.array([photo.size[0] / 2 + x, photo.size[1] / 2 - y])
+            photo.seen.append((point, np.array([photo.size[0] / 2 + x, photo.size[1] / 2 - y])))
     assert next(numbers, None) is None
     return photos
 
@@ -199,14 +199,14 @@ def read_nvm_scene(folder: Path) -> list[ReadPhoto]:
         assert rest[8] == 0
         cameras.append((ReadPhoto(folder / name, project), focal, rest[7]))
     for _ in range(int(next(words))):
-        point = tuple(float(next(words)) for _ in range(3))
+        point = np.array([float(next(words)) for _ in range(3)])
         assert all(0 <= int(next(words)) < 256 for _ in range(3))
         for _ in range(int(next(words))):
             photo, focal, radial = cameras[int(next(words))]
             next(words)
             measured = np.array([float(next(words)), float(next(words))])
             straight = measured * (1 + radial * measured @ measured / focal**2)
-            photo.seen[point] = straight
+            photo.seen.append((point, straight))
     assert next(words) == "0"  # no second model
     return [photo for photo, _, _ in cameras]
 
