@@ -19,8 +19,8 @@ _CAM_FROM_BODY = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 @dataclass(frozen=True, slots=True, eq=False)
 class OnEarth:
     """``lat_lon_alt`` (3,) degrees, degrees, metres; ``yaw_pitch_roll_deg`` (3,) as in
-    ``yaw_pitch_roll_deg``. ``residual_enu_m`` (3,): the photo's position in the model minus that of
-    EXIF, None without one with an altitude. ``horizontal_sigma_m``, ``vertical_sigma_m``: of EXIF's
+    ``yaw_pitch_roll_deg``. ``residual_enu_m`` (3,): EXIF's position minus that in the model, None
+    where EXIF has none or no altitude. ``horizontal_sigma_m``, ``vertical_sigma_m``: of EXIF's
     position, None where it says nothing."""
 
     lat_lon_alt: Float64Array
@@ -78,7 +78,7 @@ def yaw_pitch_roll_deg(cam_from_enu: Float64Array) -> Float64Array:
 def _on_earth(image: pycolmap.Image, frame: LocalFrame, position: GeoPosition | None) -> OnEarth:
     residual = None
     if position is not None and position.altitude_m is not None:
-        residual = image.projection_center() - frame.to_enu(lat_lon_alt([position]))[0]
+        residual = frame.to_enu(lat_lon_alt([position]))[0] - image.projection_center()
     return OnEarth(
         lat_lon_alt=frame.to_wgs84(image.projection_center())[0],
         yaw_pitch_roll_deg=yaw_pitch_roll_deg(image.cam_from_world().rotation.matrix()),

@@ -115,7 +115,7 @@ def _check_whole(sparse: Path) -> None:
 
 
 def _frame(folder: Path, output: Path) -> LocalFrame | None:
-    """The frame that the sidecar beside the models tells, if they are metric."""
+    """The frame that the sidecar beside the models tells, if they are in it."""
     for place in (folder, folder.absolute().parent, output):
         file = place / GEOREFERENCE
         if file.is_file():
@@ -126,7 +126,7 @@ def _frame(folder: Path, output: Path) -> LocalFrame | None:
 def _read_frame(file: Path) -> LocalFrame | None:
     try:
         content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        if content["state"] != "metric":
+        if not content.get("models_are_enu", content["state"] == "metric"):
             return None
         origin = content["origin"]
         return LocalFrame(

@@ -66,12 +66,12 @@ def test_positions_are_on_earth_where_the_frame_says():
     np.testing.assert_allclose([p.on_earth.lat_lon_alt[2] for p in positions], 250, atol=CENTIMETRE)
 
 
-def test_residuals_are_model_minus_exif():
+def test_residuals_are_exif_minus_model():
     there = FRAME.to_wgs84(np.array([[4.0, 12.0, 47.0]]))[0]
     measured = GeoPosition(*map(float, there), horizontal_sigma_m=0.02)
     scene = flight(**{"1.jpg": measured, "2.jpg": GeoPosition(45.0, -30.0)})
     first, second, third = (p.on_earth for p in camera_positions(scene))
-    np.testing.assert_allclose(second.residual_enu_m, [1, -2, 3], atol=1e-6)
+    np.testing.assert_allclose(second.residual_enu_m, [-1, 2, -3], atol=1e-6)
     assert (second.horizontal_sigma_m, second.vertical_sigma_m) == (0.02, None)
     assert first.residual_enu_m is third.residual_enu_m is None
 

@@ -140,6 +140,10 @@ def test_the_frame_is_that_of_metric_models_alone(output):
     assert read_scene(output).frame is None
     file.write_text(json.dumps(METRIC))
     assert read_scene(output).frame.altitude_m == 200
+    file.write_text(json.dumps({**METRIC, "models_are_enu": False}))
+    assert read_scene(output).frame is None
+    file.write_text(json.dumps({**METRIC, "state": "provisional", "models_are_enu": True}))
+    assert read_scene(output).frame.latitude_deg == 45
     file.write_text('{"state": "metric"}')
     with pytest.raises(InputError, match=r"georeference\.json: cannot be read"):
         read_scene(output)
