@@ -16,17 +16,12 @@ GUIDE = (ROOT / "sfm_front" / "guides" / "exports.md").read_text(encoding="utf-8
 COMMANDS = re.findall(r"^sfm-front (.*)$", GUIDE, re.M)
 
 
-def test_it_has_commands_and_all_targets():
-    assert len(COMMANDS) > 4
-    rows = re.findall(r"^\| `(\w[\w-]*)` \|[^|]*\|[^|]*\|[^|]*\|$", GUIDE, re.M)
-    assert rows != []
-    assert set(rows) == set(TARGETS)
-
-
-def test_its_next_steps_are_those_that_are_said():
-    for target in TARGETS.values():
-        step = target.next_step.format(folder="DIR").removeprefix("cd DIR && ")
-        assert any(part in GUIDE for part in (step, step.split(" --database")[0], "Load NView"))
+def test_its_table_has_all_targets_and_what_they_say_is_next():
+    rows = re.findall(r"^\| `(\w[\w-]*)` \|[^|]*\|[^|]*\|([^|]*)\|$", GUIDE, re.M)
+    assert [name for name, _ in rows] != []
+    assert {name for name, _ in rows} == set(TARGETS)
+    for name, cell in rows:
+        assert cell.strip(" `…") in TARGETS[name].next_step.format(folder="DIR")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
