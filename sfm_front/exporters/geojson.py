@@ -26,8 +26,8 @@ def write(job: Job) -> list[str]:
     ]
     if not features:
         raise InputError(
-            f"the model is not georeferenced (no {GEOREFERENCE} beside it says so), and GeoJSON has "
-            "no other coordinates; reconstruct from photos with GPS, or export --to csv"
+            f"the model is not georeferenced (no {GEOREFERENCE} beside it says so), and GeoJSON "
+            "has no other coordinates; reconstruct from photos with GPS, or export --to csv"
         )
     content = {"type": "FeatureCollection", "features": features}
     (job.folder / MAP).write_text(

@@ -112,6 +112,10 @@ def test_a_centred_camera_has_its_principal_point_in_the_middle(lens, max_size):
     np.testing.assert_allclose(centre, middle, rtol=0, atol=EXACT_PX)
     assert max(target.width, target.height) <= (max_size or WIDTH * 2)
     if max_size is None:
+        whole = target_camera(source, Projection.PINHOLE, None)
+        x, y = whole.principal_point_x, whole.principal_point_y
+        kept = 2 * min(x, whole.width - x), 2 * min(y, whole.height - y)
+        np.testing.assert_allclose((target.width, target.height), np.floor(kept), atol=EXACT_PX)
         assert target.focal_length_x == pytest.approx(source.focal_length_x)
 
 
