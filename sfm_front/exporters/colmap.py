@@ -22,6 +22,9 @@ from sfm_front.types import ModelSummary, Uint8Array
 STATE = "session.json"
 """What a session knows beside its models, in their folder."""
 
+POINT_CLOUD = "points3D.ply"
+"""The coloured points, beside a model."""
+
 logger = logging.getLogger(__name__)
 
 # What C++ takes for white space: COLMAP reads a name in a text model up to the first of it.
@@ -96,8 +99,8 @@ def _export(
         if text:
             _write_text(reconstruction, model)
         if point_clouds:
-            reconstruction.export_PLY(model / "points3D.ply")
-        _check_written(reconstruction, model)
+            reconstruction.export_PLY(model / POINT_CLOUD)
+        check_written(reconstruction, model)
         summaries.append(
             ModelSummary(
                 path=folder / str(number),
@@ -122,23 +125,27 @@ def _beside(folder: Path) -> tuple[Path, Path]:
     return folder.with_name(folder.name + ".new"), folder.with_name(folder.name + ".old")
 
 
-def _check_written(model: pycolmap.Reconstruction, folder: Path) -> None:
-    """pycolmap does not tell when a disk or a quota was full: compare what there should be.
+def check_written(model: pycolmap.Reconstruction, folder: Path, *, binary: bool = True) -> None:
+    """Raise OSError unless what pycolmap wrote of ``model`` to ``folder`` is whole: its ``binary``
+    form, else text, and text and PLY wherever they are there.
 
-    The small files are written before the large ones and would not have fitted less.
+    pycolmap does not tell when a disk or a quota was full: compare what there should be. The small
+    files are written before the large ones and would not have fitted less.
     """
+    whole = True
     # colmap.github.io/format.html, and 15 bytes a point in a PLY file.
-    images = 8 + sum(
-        4 + 56 + 4 + len(os.fsencode(image.name)) + 1 + 8 + 24 * image.num_points2D()
-        for image in map(model.image, model.reg_image_ids())
-    )
-    points = 8 + 51 * model.num_points3D() + 8 * model.compute_num_observations()
-    whole = _size(folder / "images.bin") == images and _size(folder / "points3D.bin") == points
-    cloud = folder / "points3D.ply"
+    if binary:
+        images = 8 + sum(
+            4 + 56 + 4 + len(os.fsencode(image.name)) + 1 + 8 + 24 * image.num_points2D()
+            for image in map(model.image, model.reg_image_ids())
+        )
+        points = 8 + 51 * model.num_points3D() + 8 * model.compute_num_observations()
+        whole = _size(folder / "images.bin") == images and _size(folder / "points3D.bin") == points
+    cloud = folder / POINT_CLOUD
     if whole and cloud.exists():
         _, end, data = cloud.read_bytes().partition(b"end_header\n")
         whole = bool(end) and len(data) == 15 * model.num_points3D()
-    if whole and (folder / "points3D.txt").exists():
+    if whole and (not binary or (folder / "points3D.txt").exists()):
         whole = _is_whole_text(model, folder)
     if not whole:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -52,15 +52,15 @@ class Uncertainty:
 class Sidecar:
     """What the file says.
 
-    ``models_are_enu``: whether the models beside it are in ENU. ``enu_from_built``: from the frame
-    in which the largest was built. ``names``: of the photos of outliers, by image id. ``left_out``:
-    photos whose position was not fit for use, by name, and why.
+    ``models_in_enu``: numbers of those beside it that are in ENU. ``enu_from_built``: from the
+    frame in which the largest was built. ``names``: of the photos of outliers, by image id.
+    ``left_out``: photos whose position was not fit for use, by name, and why.
     """
 
     state: GeoreferenceState
     reasons: tuple[str, ...] = ()
     origin: LocalFrame | None = None
-    models_are_enu: bool = False
+    models_in_enu: tuple[int, ...] = ()
     enu_from_built: pycolmap.Sim3d | None = None
     uncertainty: Uncertainty | None = None
     residuals: ResidualSummary | None = None
@@ -76,7 +76,7 @@ def sidecar_of(
     left_out: Mapping[str, str],
     *,
     enu_from_built: pycolmap.Sim3d | None,
-    models_are_enu: bool,
+    models_in_enu: tuple[int, ...],
 ) -> Sidecar:
     """``cam_from_model``: the poses that the georeference was made from; ``names`` of its photos.
     Both by image id."""
@@ -95,7 +95,7 @@ def sidecar_of(
         state=georeference.state,
         reasons=georeference.reasons,
         origin=georeference.frame,
-        models_are_enu=models_are_enu,
+        models_in_enu=models_in_enu,
         enu_from_built=enu_from_built,
         uncertainty=Uncertainty(
             alignment.scale_sigma,
@@ -121,7 +121,7 @@ def write_sidecar(path: Path, sidecar: Sidecar) -> None:
             "reasons": list(sidecar.reasons),
             "crs": _CRS,
             "origin": origin and asdict(origin),
-            "models_are_enu": sidecar.models_are_enu,
+            "models_in_enu": list(sidecar.models_in_enu),
             "enu_from_built": moved
             and {
                 "scale": float(moved.scale),  # pycolmap hands out an array
@@ -165,7 +165,7 @@ def _of_row(row: Mapping[str, Any]) -> Sidecar:
         state=GeoreferenceState(row["state"]),
         reasons=tuple(row["reasons"]),
         origin=row["origin"] and LocalFrame(**row["origin"]),
-        models_are_enu=row["models_are_enu"],
+        models_in_enu=tuple(row["models_in_enu"]),
         enu_from_built=moved
         and pycolmap.Sim3d(
             moved["scale"],

@@ -68,7 +68,7 @@ class Georeferencing:
             names,
             {names[image_id]: reason.value for image_id, reason in left_out.items()},
             enu_from_built=self._enu_from_built.get(models[0].model_id),
-            models_are_enu=models[0].is_georeferenced,
+            models_in_enu=tuple(n for n, model in enumerate(models) if model.is_georeferenced),
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -31,7 +31,7 @@ def run_in_process_of_its_own(*arguments: str) -> subprocess.CompletedProcess[st
     "arguments",
     [
         ["--help"],
-        *([name, "--help"] for name in ("reconstruct", "retrieve", "view")),
+        *([name, "--help"] for name in ("reconstruct", "retrieve", "view", "export")),
         ["--version"],
     ],
 )

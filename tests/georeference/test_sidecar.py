@@ -45,7 +45,7 @@ def full() -> Sidecar:
         {image_id: f"{image_id}.jpg" for image_id in ids},
         {"ä.jpg": "altitude 0 where others have one"},
         enu_from_built=BUILT,
-        models_are_enu=True,
+        models_in_enu=(0,),
     )
 
 
@@ -82,7 +82,7 @@ def test_no_georeference_is_said_too(tmp_path):
         {},
         {},
         enu_from_built=None,
-        models_are_enu=False,
+        models_in_enu=(),
     )
     write_sidecar(tmp_path / FILE_NAME, nothing)
     assert read_sidecar(tmp_path / FILE_NAME) == nothing
