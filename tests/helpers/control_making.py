@@ -9,8 +9,8 @@ import numpy as np
 import pycolmap
 
 from sfm_front.geometry.enu import LocalFrame
-from sfm_front.georeference.control_point_file import ControlPoint
-from sfm_front.georeference.photo_marks import PhotoMark
+from sfm_front.georeference.control.marks import PhotoMark
+from sfm_front.georeference.control.point_file import ControlPoint
 from sfm_front.mapping.bundle_adjustment import adjust_all
 from sfm_front.types import GeoPosition
 

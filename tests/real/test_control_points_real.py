@@ -8,14 +8,14 @@ from helpers.locations import DATA
 
 from sfm_front.cli.main import main
 from sfm_front.geometry.enu import LocalFrame
-from sfm_front.georeference.control_point_file import read_control_points
-from sfm_front.georeference.control_points import (
-    ControlOptions,
+from sfm_front.georeference.control.control_points import (
     ControlResult,
-    PointRole,
     hold_to_control_points,
 )
-from sfm_front.georeference.photo_marks import marks_in_photos
+from sfm_front.georeference.control.marks import marks_in_photos
+from sfm_front.georeference.control.options import ControlOptions
+from sfm_front.georeference.control.point_file import read_control_points
+from sfm_front.georeference.control.residuals import PointRole
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
 from sfm_front.storage.colmap_models import read_model
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pycolmap
 
-from sfm_front.georeference.mark_triangulation import Sighting
-from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
+from sfm_front.georeference.control.triangulation import Sighting
+from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, robust_adjustment
 from sfm_front.types import Float64Array
 
 # Of the two cameras that hold a point, in metres. So far away, rays are parallel: what is off by
@@ -58,7 +58,8 @@ def adjust_with_control(
     for point in held:
         _hold(model, config, point, pixel_sigma)
     for loss in (pycolmap.LossFunctionType.TRIVIAL, pycolmap.LossFunctionType.CAUCHY):
-        adjustment = _adjustment(options, loss, large=len(config.images) >= options.large_from)
+        adjustment = robust_adjustment(options, reconstruction.num_reg_images())
+        adjustment.ceres.loss_function_type = loss
         pycolmap.create_default_bundle_adjuster(adjustment, config, model).solve()
     _take_back(reconstruction, model)
 
@@ -100,22 +101,6 @@ def _hold(
         config.set_constant_rig_from_world_pose(model.image(image_id).frame_id)
         track.add_element(image_id, 0)
     model.add_point3D(point.xyz, track)
-
-
-def _adjustment(
-    options: RobustAdjustmentOptions, loss: pycolmap.LossFunctionType, *, large: bool
-) -> pycolmap.BundleAdjustmentOptions:
-    adjustment = pycolmap.BundleAdjustmentOptions()
-    adjustment.print_summary = False
-    adjustment.refine_focal_length = options.refine_intrinsics
-    adjustment.refine_extra_params = options.refine_intrinsics
-    adjustment.refine_principal_point = False
-    adjustment.ceres.loss_function_type = loss
-    adjustment.ceres.loss_function_scale = options.loss_scale_px
-    solver = adjustment.ceres.solver_options
-    solver.function_tolerance = options.large_tolerance if large else options.tolerance
-    solver.num_threads = options.num_threads
-    return adjustment
 
 
 def _take_back(reconstruction: pycolmap.Reconstruction, adjusted: pycolmap.Reconstruction) -> None:

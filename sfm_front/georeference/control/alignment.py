@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sfm_front.geometry.similarity import Similarities
+from sfm_front.georeference.control.surveyed import Surveyed
 from sfm_front.types import Float64Array
 
 # Samples of three that are looked at: all of them up to 24 points.
@@ -20,25 +21,6 @@ _MIN_WIDTH = 0.02
 _OUTLIER = 3.0
 _OUTLIER_SIGMAS = 5.0
 _ITERATIONS = 10
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Surveyed:
-    """N points in metres east, north and up.
-
-    ``enu`` (N, 3) without gaps; ``sigmas`` (N, 3) standard deviations; ``has_height`` (N,): where
-    it is not known, ``enu`` and ``sigmas`` hold an assumption.
-    """
-
-    enu: Float64Array
-    sigmas: Float64Array
-    has_height: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.enu)
-
-    def __getitem__(self, chosen: NDArray[np.bool_]) -> Surveyed:
-        return Surveyed(self.enu[chosen], self.sigmas[chosen], self.has_height[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,13 +9,13 @@ from helpers.control_making import FRAME, K1, Flight, bent, displaced, make_flig
 
 from sfm_front.errors import ConfigError
 from sfm_front.geometry.similarity import Similarities
-from sfm_front.georeference.control_points import (
-    ControlOptions,
+from sfm_front.georeference.control.control_points import (
     ControlResult,
     NotControlled,
-    PointRole,
     hold_to_control_points,
 )
+from sfm_front.georeference.control.options import ControlOptions
+from sfm_front.georeference.control.residuals import PointRole
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
 
 # Within this are 90 % of the checkpoints: marks of 0.3 px, points of 5 mm, 2.2 cm a pixel.

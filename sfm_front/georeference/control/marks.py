@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from sfm_front.errors import InputError
-from sfm_front.georeference.control_point_file import ControlPoint, Mark
+from sfm_front.georeference.control.point_file import ControlPoint, Mark
 
 Size = tuple[int, int]
 """Width and height in pixels."""

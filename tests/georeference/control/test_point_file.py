@@ -1,7 +1,7 @@
 import pytest
 
 from sfm_front.errors import InputError
-from sfm_front.georeference.control_point_file import Mark, read_control_points
+from sfm_front.georeference.control.point_file import Mark, read_control_points
 
 POINTS = ("9.000 48.000 300.5", "9.001 48.000 301", "9.000 48.001 302")
 

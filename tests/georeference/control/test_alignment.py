@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from sfm_front.geometry.similarity import Similarities
-from sfm_front.georeference.control_alignment import Surveyed, align_to_surveyed
+from sfm_front.georeference.control.alignment import Surveyed, align_to_surveyed
 
 SIGMA_M = 0.01
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from helpers.model_building import looking, make_model
 
-from sfm_front.georeference.mark_triangulation import Sighting, triangulate
+from sfm_front.georeference.control.triangulation import Sighting, triangulate
 
 TARGET = np.array([0.3, 10.0, -0.2])
 NOISE_PX = 0.3

@@ -1,8 +1,8 @@
 import pytest
 
 from sfm_front.errors import InputError
-from sfm_front.georeference.control_point_file import ControlPoint, Mark
-from sfm_front.georeference.photo_marks import PhotoMark, marks_in_photos
+from sfm_front.georeference.control.marks import PhotoMark, marks_in_photos
+from sfm_front.georeference.control.point_file import ControlPoint, Mark
 from sfm_front.types import GeoPosition
 
 
