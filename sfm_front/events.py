@@ -190,6 +190,42 @@ class Georeferenced:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class HeldToControlPoints:
+    """A finished model was moved and adjusted to control points.
+
+    It is in ENU, ``origin`` its latitude and longitude in degrees and altitude in metres.
+    ``ce90_m`` and ``le90_m``: of the checkpoints, or of the control points where there are none;
+    None where no point says.
+    """
+
+    model_id: int
+    origin: tuple[float, float, float]
+    num_control: int
+    num_checkpoints: int
+    ce90_m: float | None
+    le90_m: float | None
+
+    def __str__(self) -> str:
+        within = "".join(
+            f", {name} {value:.3f} m"
+            for name, value in (("CE90", self.ce90_m), ("LE90", self.le90_m))
+            if value is not None
+        )
+        points = f"{self.num_control} control points and {self.num_checkpoints} checkpoints"
+        return f"model {self.model_id} is held to {points}{within}"
+
+
+@dataclass(frozen=True, slots=True)
+class ControlPointsRefused:
+    """Control points cannot hold a model, as far as photos have come; it is left as it is."""
+
+    reason: str
+
+    def __str__(self) -> str:
+        return f"control points cannot be used: {self.reason}"
+
+
 ModelEvent: TypeAlias = (
     ModelStarted
     | ModelDropped
@@ -199,6 +235,8 @@ ModelEvent: TypeAlias = (
     | RegisteredStructureLess
     | LookedAgain
     | Georeferenced
+    | HeldToControlPoints
+    | ControlPointsRefused
 )
 
 

@@ -6,7 +6,7 @@ import shutil
 import time
 from typing import TextIO
 
-from sfm_front.events import Event, PhotoAdded
+from sfm_front.events import ControlPointsRefused, Event, PhotoAdded
 from sfm_front.reports.summary import clock
 from sfm_front.types import Skipped
 
@@ -50,6 +50,7 @@ class ProgressLine(LiveLine):
         self._done = 0
         self._registered = 0
         self._points = 0
+        self._is_finishing = False
 
     def expect(self, total: int) -> None:
         """Time counts from now, to ``total`` photos."""
@@ -57,7 +58,10 @@ class ProgressLine(LiveLine):
         self._started = time.perf_counter()
 
     def show(self, event: Event) -> None:
-        """Count a photo and show where things stand; other events change nothing."""
+        """Count a photo and show where things stand. Of other events only what can be mended while
+        photos come is told; the closing summary has all."""
+        if isinstance(event, ControlPointsRefused) and not self._is_finishing:
+            self.note(str(event))
         if isinstance(event, Skipped):
             self.note(f"skipped {event.name}: {event}")
         elif isinstance(event, PhotoAdded):
@@ -73,6 +77,7 @@ class ProgressLine(LiveLine):
         )
 
     def finishing(self) -> None:
+        self._is_finishing = True
         self._write("last refinement, then writing the models …")
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,6 +135,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="auto (default): models are in metres, east, north and up, as soon as positions fix "
         "that; off: they stay in a frame of their own",
     )
+    positions.add_argument(
+        "--gcp",
+        type=Path,
+        metavar="FILE",
+        help="control points, to which the model is held at the end: ODM's gcp_list.txt; points "
+        "whose name ends in _check are only measured",
+    )
+    positions.add_argument(
+        "--gcp-size",
+        metavar="W,H",
+        help="pixels of the photos in which they were marked, if the photos were reduced since",
+    )
+    positions.add_argument(
+        "--gcp-accuracy",
+        metavar="H[,V]",
+        help="their standard deviation in metres, horizontal and vertical (default: 0.02,0.03; "
+        "without V, twice H), where the file does not say it",
+    )
     retrieval = parser.add_argument_group("retrieval")
     shared.add_retrieval(retrieval)
     retrieval.add_argument(
@@ -169,12 +187,13 @@ def run(arguments: argparse.Namespace) -> int:
     # Once more: pycolmap has put a handler of its own for SIGTERM in place.
     with leaving_at_signal(1):
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
+        from sfm_front.session.output_folder import holds_session
         from sfm_front.session.resume import Newcomers, nothing_to_do
         from sfm_front.session.session import Session
 
         options = session_options(arguments)
         watch = WatchOptions(idle_timeout_s=arguments.idle_timeout)
-        photos = []
+        photos: list[PhotoPath] = []
         if arguments.watch:
             check_watchable(folder)
         else:
@@ -184,6 +203,8 @@ def run(arguments: argparse.Namespace) -> int:
         ):
             print(f"{output}: finished, and holds all photos of {folder}: nothing to do")
             return 0
+        if not arguments.watch and (overwrite or not holds_session(output)):
+            _check_control_points(options, photos)
         progress = ProgressLine(sys.stderr if arguments.events else sys.stdout)
         on_event = _event_printer() if arguments.events else progress.show
         session = Session(
@@ -240,6 +261,16 @@ def _photos(
     return order_photos(listed, arguments.order, seed=options.seed)
 
 
+def _check_control_points(options: SessionOptions, photos: Sequence[PhotoPath]) -> None:
+    """All photos are known: told before hours of work if too few of them have marks."""
+    from sfm_front.georeference.control.marks import check_photos
+    from sfm_front.georeference.control.point_file import read_control_points
+
+    file = options.control_points.file
+    if file is not None:
+        check_photos(file, read_control_points(file), (photo.name for photo in photos))
+
+
 def _folder(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("give a folder, or leave --output out")
@@ -278,15 +309,31 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     given["cameras"] = replace(
         base.cameras, **{name: value for name, value in cameras.items() if value is not None}
     )
-    positions: dict[str, Any] = {} if arguments.gps is None else {"source": arguments.gps}
-    accuracy = _numbers("--gps-accuracy", arguments.gps_accuracy)
-    if accuracy is not None:
-        if len(accuracy) > 2:
-            raise ConfigError(f"--gps-accuracy takes one or two numbers, got {len(accuracy)}")
-        positions["horizontal_sigma_m"] = accuracy[0]
-        positions["vertical_sigma_m"] = accuracy[1] if len(accuracy) == 2 else 2 * accuracy[0]
+    positions = _sigmas("--gps-accuracy", arguments.gps_accuracy)
+    if arguments.gps is not None:
+        positions["source"] = arguments.gps
     given["positions"] = replace(base.positions, **positions)
+    control = _sigmas("--gcp-accuracy", arguments.gcp_accuracy)
+    if arguments.gcp is not None:
+        control["file"] = arguments.gcp
+    size = _numbers("--gcp-size", arguments.gcp_size)
+    if size is not None:
+        if len(size) != 2 or any(side != int(side) or side < 1 for side in size):
+            raise ConfigError(f"--gcp-size takes width and height, got {arguments.gcp_size!r}")
+        control["marked_size"] = tuple(map(int, size))
+    given["control_points"] = replace(base.control_points, **control)
     return replace(base, **given)
+
+
+def _sigmas(argument: str, text: str | None) -> dict[str, Any]:
+    """Options of these names, if it was given."""
+    sigmas = _numbers(argument, text)
+    if sigmas is None:
+        return {}
+    if len(sigmas) > 2:
+        raise ConfigError(f"{argument} takes one or two numbers, got {len(sigmas)}")
+    vertical = sigmas[1] if len(sigmas) == 2 else 2 * sigmas[0]
+    return {"horizontal_sigma_m": sigmas[0], "vertical_sigma_m": vertical}
 
 
 def _numbers(argument: str, text: str | None) -> tuple[float, ...] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from typing import Any
 
@@ -113,8 +113,7 @@ class Georeferencer:
         positions: Mapping[int, PhotoPosition],
     ) -> Georeference:
         """The same of any model: nothing is remembered but the frame, if it is the first."""
-        ids = [image_id for image_id in cam_from_model if image_id in positions]
-        ids.sort(key=lambda image_id: _order(image_id, positions[image_id]))
+        ids = _in_order(cam_from_model, positions)
         found = [positions[image_id] for image_id in ids]
         poses = [cam_from_model[image_id] for image_id in ids]
         if not ids:
@@ -145,6 +144,34 @@ class Georeferencer:
             reasons=verdict.reasons,
             held=bool(refused),
         )
+
+    @property
+    def frame(self) -> LocalFrame | None:
+        """Where positions have fixed the origin."""
+        return self._frame
+
+    def compare(
+        self,
+        cam_from_enu: Mapping[int, pycolmap.Rigid3d],
+        positions: Mapping[int, PhotoPosition],
+        frame: LocalFrame,
+        reason: str,
+    ) -> Georeference:
+        """Positions beside a model in this frame that something better holds, which is the
+        ``reason`` why it is metric: they do not move it, and nothing of this is remembered."""
+        ids = _in_order(cam_from_enu, positions)
+        poses = [cam_from_enu[image_id] for image_id in ids]
+        metric = Georeference(state=GeoreferenceState.METRIC, frame=frame, reasons=(reason,))
+        if not ids:
+            return metric
+        fixes = _fixes([positions[image_id] for image_id in ids], frame)
+        alignment = self._align(poses, fixes)
+        if alignment is None:
+            return metric
+        raised = fixes.raised(alignment.height_offsets)
+        residuals = np.where(fixes.known, raised.enu - camera_centres(poses), np.nan)
+        stays = replace(alignment, enu_from_model=pycolmap.Sim3d(), residuals=residuals)
+        return replace(metric, alignment=stays, fixes=fixes, image_ids=tuple(ids))
 
     def as_json(self) -> dict[str, Any]:
         """What a resumed session needs to hold the frame; read by ``restore``."""
@@ -212,6 +239,14 @@ def _held(
         positions_only=anchors.positions_only,
         height_offsets=offsets,
     )
+
+
+def _in_order(
+    cam_from_model: Mapping[int, pycolmap.Rigid3d], positions: Mapping[int, PhotoPosition]
+) -> list[int]:
+    """The photos with a position, as they were taken."""
+    ids = [image_id for image_id in cam_from_model if image_id in positions]
+    return sorted(ids, key=lambda image_id: _order(image_id, positions[image_id]))
 
 
 def _order(image_id: int, position: PhotoPosition) -> tuple[int, float, int]:

@@ -21,6 +21,7 @@ from sfm_front.georeference.accuracy import (
     summarise,
 )
 from sfm_front.georeference.anchors import camera_centres
+from sfm_front.georeference.control.report import ControlReport
 from sfm_front.georeference.georeferencer import Georeference
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.storage.json_files import write_json
@@ -67,6 +68,7 @@ class Sidecar:
     names: Mapping[int, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
     height_offsets_m: Mapping[int, float] = field(default_factory=dict)
+    control_points: ControlReport | None = None
 
 
 def sidecar_of(
@@ -137,6 +139,7 @@ def write_sidecar(path: Path, sidecar: Sidecar) -> None:
                 {"flight": flight, "metres": metres}
                 for flight, metres in sidecar.height_offsets_m.items()
             ],
+            "control_points": sidecar.control_points and sidecar.control_points.as_json(),
         },
     )
 
@@ -161,6 +164,7 @@ def read_sidecar(path: Path) -> Sidecar:
 
 def _of_row(row: Mapping[str, Any]) -> Sidecar:
     moved, residuals, uncertainty = row["enu_from_built"], row["residuals"], row["uncertainty"]
+    control = row.get("control_points")  # absent in files of earlier versions
     return Sidecar(
         state=GeoreferenceState(row["state"]),
         reasons=tuple(row["reasons"]),
@@ -178,6 +182,7 @@ def _of_row(row: Mapping[str, Any]) -> Sidecar:
         names={one["image_id"]: one["name"] for one in residuals["outliers"]} if residuals else {},
         left_out={one["name"]: one["reason"] for one in row["left_out"]},
         height_offsets_m={one["flight"]: one["metres"] for one in row["height_offsets"]},
+        control_points=None if control is None else ControlReport.of_json(control),
     )
 
 

@@ -26,9 +26,14 @@ def final_adjustment(
     """
     adjust_robustly(reconstruction, options, principal_point=False)
     polished = with_principal_point(reconstruction, calibration or CalibrationOptions(), options)
+    drop_misfits(polished)
+    return polished
+
+
+def drop_misfits(reconstruction: pycolmap.Reconstruction) -> None:
+    """Drop points and observations that do not fit, by COLMAP's limits; errors are those now."""
     limits = pycolmap.IncrementalMapperOptions()
-    pycolmap.ObservationManager(polished).filter_all_points3D(
+    pycolmap.ObservationManager(reconstruction).filter_all_points3D(
         limits.filter_max_reproj_error, limits.filter_min_tri_angle
     )
-    polished.update_point_3d_errors()
-    return polished
+    reconstruction.update_point_3d_errors()

@@ -11,11 +11,11 @@ import pycolmap
 
 from sfm_front.events import Emit, ModelRefined
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
-from sfm_front.mapping.bundle_adjustment import robust_adjustment
+from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, robust_adjustment
 from sfm_front.mapping.calibration import impossible_photos, is_miscalibrated
 from sfm_front.mapping.camera_motion import camera_centers, camera_motion
 from sfm_front.mapping.carry_over import Before, carry_over
-from sfm_front.mapping.final_adjustment import final_adjustment
+from sfm_front.mapping.final_adjustment import drop_misfits, final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
 from sfm_front.mapping.position_priors import PositionPriors, held_to_positions
@@ -293,6 +293,17 @@ class Model:
             for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
         # What is asked of the mapper from here on must be of the model that is handed out.
+        self._begin_anew()
+
+    @property
+    def robust(self) -> RobustAdjustmentOptions:
+        """How it is adjusted at its end."""
+        return self._options.robust
+
+    def adopt(self, adjusted: pycolmap.Reconstruction) -> None:
+        """Become this adjusted copy of it, without the points that do not fit any more."""
+        drop_misfits(adjusted)
+        self.reconstruction = adjusted
         self._begin_anew()
 
     @property

@@ -18,6 +18,8 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``registered_structure_less`` | photos placed by two-view geometry alone |
 | ``looked_again`` | a poorly connected photo was matched with more: ``found`` overlap |
 | ``georeferenced`` | how far positions say where a model stands on the earth |
+| ``held_to_control_points`` | the finished model, with its ``origin`` and how well it fits |
+| ``control_points_refused`` | why they cannot be used; the model is left as it is |
 | ``session_ended`` | ``finished``: whether all models are written |
 
 New fields and events leave the version as it is; readers pass over what they do not know.
@@ -36,8 +38,10 @@ from typing import IO, Any
 
 from sfm_front.errors import StorageError
 from sfm_front.events import (
+    ControlPointsRefused,
     Event,
     Georeferenced,
+    HeldToControlPoints,
     LookAlikesRefused,
     LookedAgain,
     ModelDropped,
@@ -75,6 +79,8 @@ _NAMES: dict[type, str] = {
     RegisteredStructureLess: "registered_structure_less",
     LookedAgain: "looked_again",
     Georeferenced: "georeferenced",
+    HeldToControlPoints: "held_to_control_points",
+    ControlPointsRefused: "control_points_refused",
     SessionEnded: "session_ended",
 }
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sfm_front.errors import InputError
+from sfm_front.georeference.control.report import ControlReport
 from sfm_front.reports.run_summary import (
     AuditOutcome,
     Latency,
@@ -44,6 +45,7 @@ def write_report(output: Path, summary: RunSummary) -> None:
         ],
         "end": {"seconds": _rounded(summary.end_seconds), "events": summary.end_events},
         "look_alikes": summary.look_alikes,
+        "control_points": summary.control_points and summary.control_points.as_json(),
         "totals": {
             "photos": totals.num_photos,
             "used": totals.num_used,
@@ -162,7 +164,12 @@ def _summary(content: dict[str, Any]) -> RunSummary:
             tuple(tuple(group) for group in groups)
             for groups in content.get("look_alikes", ())  # absent in reports of earlier versions
         ),
+        control_points=_control_points(content.get("control_points")),  # as well
     )
+
+
+def _control_points(row: dict[str, Any] | None) -> ControlReport | None:
+    return None if row is None else ControlReport.of_json(row)
 
 
 def _latency(row: dict[str, float] | None) -> Latency | None:

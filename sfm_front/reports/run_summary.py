@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from sfm_front.georeference.control.report import ControlReport
 from sfm_front.types import Skipped
 
 
@@ -117,6 +118,7 @@ class RunSummary:
 
     ``end_events`` are those of idle times, too. ``look_alikes``: names of the photos of two groups
     that show things that look alike, each time a model was taken apart for it.
+    ``control_points``: what became of them; None if none were given.
     """
 
     photos: tuple[Outcome, ...]
@@ -125,6 +127,7 @@ class RunSummary:
     end_events: tuple[str, ...]
     totals: Totals
     look_alikes: tuple[tuple[tuple[str, ...], ...], ...] = ()
+    control_points: ControlReport | None = None
 
     @property
     def used(self) -> list[PhotoOutcome]:

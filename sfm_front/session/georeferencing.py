@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
 import pycolmap
 
 from sfm_front.events import Emit, Georeferenced
+from sfm_front.geometry.enu import LocalFrame
 from sfm_front.geometry.exif_orientation import upright_from_cam
+from sfm_front.georeference.control.report import ControlReport
 from sfm_front.georeference.georeferencer import Georeference, Georeferencer, PhotoPosition
 from sfm_front.georeference.sidecar import Sidecar, sidecar_of
 from sfm_front.georeference.spread import GeoreferenceState
@@ -32,11 +34,12 @@ class Georeferencing:
         self._emit = emit
         self._is_on = is_on
         self._georeferencer = Georeferencer(seed=seed)
-        self.georeference = Georeference()
+        self.georeference = Georeference(reasons=("no photo has a position",))
         self._told: tuple[int, GeoreferenceState] | None = None
         self._num_looked_at = 0
         # Model id → from the frame in which it was built.
         self._enu_from_built: dict[int, pycolmap.Sim3d] = {}
+        self._controlled: _Controlled | None = None
 
     def follow(self, models: Sequence[Model]) -> None:
         """After each photo: look at the models if there are clearly more positions than before."""
@@ -53,11 +56,66 @@ class Georeferencing:
             if not model.is_under_way:  # else next time
                 self._look_at(model, measured, is_largest=number == 0)
 
-    def sidecar(self, models: Sequence[Model]) -> Sidecar | None:
-        """What ``georeference.json`` says of the largest model as ``settle`` has left it; None if
-        there are no positions."""
-        if not self._is_on or not len(self._positions):
+    def frame_of(self, models: Sequence[Model]) -> LocalFrame | None:
+        """The one in which positions have put some of them; None if they have put none there."""
+        is_fixed = any(model.is_georeferenced for model in models)
+        return self._georeferencer.frame if is_fixed else None
+
+    def held_to_control(
+        self,
+        models: Sequence[Model],
+        number: int,
+        frame: LocalFrame,
+        enu_from_model: pycolmap.Sim3d,
+        reason: str,
+    ) -> None:
+        """Control points have moved a finished model by this into the frame: what positions say of
+        it is compared anew. ``reason``: why it is metric, in words.
+
+        Where no positions fixed the frame, that is not kept: the next run, whose control points may
+        be others, begins without.
+        """
+        model = models[number]
+        before = self._enu_from_built.get(model.model_id)
+        built = enu_from_model if before is None else enu_from_model * before
+        if model.is_georeferenced:
+            self._enu_from_built[model.model_id] = built
+        self._controlled = _Controlled(model.model_id, built)
+        if number == 0:
+            measured = self._positions.measured(self._positions.checked().usable)
+            poses = self._upright_poses(model)
+            self.georeference = self._georeferencer.compare(poses, measured, frame, reason)
+        elif self.georeference.state is not GeoreferenceState.METRIC:
+            self.georeference = Georeference(
+                state=GeoreferenceState.METRIC, frame=frame, reasons=(reason,)
+            )
+
+    def sidecar(
+        self, models: Sequence[Model], control: ControlReport | None = None
+    ) -> Sidecar | None:
+        """What ``georeference.json`` says of the largest model as ``settle`` has left it, and of
+        control points; None if there are neither these nor positions."""
+        if not self._is_on or not (len(self._positions) or control):
             return None
+        found, held = self._by_positions(models), self._controlled
+        if control is None:
+            return found
+        found = replace(found, control_points=control)
+        if held is None:
+            return found
+        in_enu = (
+            number
+            for number, model in enumerate(models)
+            if model.is_georeferenced or model.model_id == held.model_id
+        )
+        found = replace(found, models_in_enu=tuple(in_enu))
+        if models[0].model_id != held.model_id:
+            return found
+        # The uncertainty that follows from positions is not that of control points, whose
+        # residuals say how exact it is.
+        return replace(found, enu_from_built=held.enu_from_built, uncertainty=None)
+
+    def _by_positions(self, models: Sequence[Model]) -> Sidecar:
         if not models:
             return Sidecar(state=GeoreferenceState.NONE, reasons=("there is no model",))
         names = self._positions.names
@@ -95,10 +153,7 @@ class Georeferencing:
         self, model: Model, measured: Mapping[int, PhotoPosition], *, is_largest: bool
     ) -> None:
         look = self._georeferencer.update if is_largest else self._georeferencer.look_at
-        poses = {
-            image_id: upright_from_cam(self._positions.orientation_of(image_id)) * cam_from_world
-            for image_id, cam_from_world in _cam_from_world(model).items()
-        }
+        poses = self._upright_poses(model)
         found = look(poses, measured)
         if found.state is GeoreferenceState.METRIC and found.alignment is not None:
             moved = found.alignment.enu_from_model
@@ -110,6 +165,12 @@ class Georeferencing:
         if is_largest:
             self.georeference = found
             self._tell(model, found)
+
+    def _upright_poses(self, model: Model) -> dict[int, pycolmap.Rigid3d]:
+        return {
+            image_id: upright_from_cam(self._positions.orientation_of(image_id)) * cam_from_world
+            for image_id, cam_from_world in _cam_from_world(model).items()
+        }
 
     def _tell(self, model: Model, found: Georeference) -> None:
         told = model.model_id, found.state
@@ -128,6 +189,14 @@ class Georeferencing:
                 reasons=found.reasons,
             )
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Controlled:
+    """The model that control points hold."""
+
+    model_id: int
+    enu_from_built: pycolmap.Sim3d
 
 
 def _cam_from_world(model: Model) -> dict[int, pycolmap.Rigid3d]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from sfm_front.errors import ConfigError
 from sfm_front.features.global_descriptors.descriptor import AUTO, VLAD_WEIGHT, check_vlad_weight
 from sfm_front.features.sift import SiftOptions
+from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.mapping.atlas import AtlasOptions
 from sfm_front.matching.guided_matching import GuidedOptions
 from sfm_front.matching.nearest_neighbors import MatchingOptions
@@ -74,6 +75,8 @@ class SessionOptions:
     cameras: CameraOptions = field(default_factory=CameraOptions)
     # Where photos were taken, and how exactly that is known.
     positions: PositionOptions = field(default_factory=PositionOptions)
+    # Surveyed points with marks in photos, to which a model is held at the end.
+    control_points: ControlOptions = field(default_factory=ControlOptions)
     # Whether models are moved to where positions say they stand: auto, as soon as these fix it, or
     # off.
     georegister: str = AUTO
@@ -103,6 +106,8 @@ class SessionOptions:
             raise ConfigError(f"threads must be at least 1, got {self.threads}")
         if self.georegister not in (AUTO, OFF):
             raise ConfigError(f"georegister must be {AUTO} or {OFF}, got {self.georegister!r}")
+        if self.georegister == OFF and self.control_points.file is not None:
+            raise ConfigError("control points move a model: leave georegister = off out, or them")
         if self.snapshot_seconds <= 0:
             raise ConfigError(f"snapshot_seconds must be above 0, got {self.snapshot_seconds}")
         if self.cache_mb is not None and self.cache_mb < 1:

@@ -24,6 +24,7 @@ from sfm_front.retrieval.retriever import Retriever
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.announcer import Announcer
 from sfm_front.session.catalog import PhotoCatalog
+from sfm_front.session.control_points import ControlPoints
 from sfm_front.session.georeferencing import Georeferencing
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.pair_matching import CandidateMatcher
@@ -50,6 +51,7 @@ class SessionParts:
     second_look: SecondLook
     positions: PhotoPositions
     georeferencing: Georeferencing
+    control_points: ControlPoints
     report: RunReport
 
 
@@ -60,6 +62,7 @@ def open_parts(
     device: str,
     descriptor: GlobalDescriptor,
     positions: PhotoPositions,
+    control_points: ControlPoints,
     announcer: Announcer,
 ) -> SessionParts:
     """Make all parts; ``opened`` closes those that hold threads, processes or files."""
@@ -120,6 +123,7 @@ def open_parts(
             seed=options.seed,
             is_on=options.georegister != OFF,
         ),
+        control_points=control_points,
         report=RunReport(),
     )
 
@@ -138,6 +142,7 @@ def restore(parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer
         keypoints, colors = database.keypoints(image_id)
         parts.catalog.restore(photo, camera, colors)
         parts.positions.take(image_id, photo.name, photo.exif)
+        parts.control_points.take(photo.name, (photo.width, photo.height))
         parts.retriever.remember(image_id, photo.global_vector)
         parts.report.restore(photo)
         pairs = database.pairs(image_id)

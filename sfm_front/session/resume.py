@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, overload
 
 from sfm_front.errors import InputError
-from sfm_front.photos.positions import PositionOptions
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import check_output_folder, holds_session
 from sfm_front.session.photo_folders import PhotoFolders
@@ -22,9 +23,11 @@ _OPTIONS = "options"
 _STATE = "state"
 _RUNNING, _FINISHED = "running", "finished"
 
-_POSITIONS = "positions"
-# These say how the work is done, not what comes out of it. What comes of positions is computed
-# anew whenever a session goes on: no photo is stored with more than its own EXIF.
+_FILES = "files"
+# What comes of these is computed anew whenever a session goes on: no photo is stored with more than
+# its own EXIF.
+_ANEW = ("positions", "control_points")
+# The others say how the work is done, not what comes out of it.
 _FREE = frozenset(
     {
         "threads",
@@ -34,7 +37,7 @@ _FREE = frozenset(
         "text",
         "snapshot_seconds",
         "cache_mb",
-        _POSITIONS,
+        *_ANEW,
     }
 )
 
@@ -66,6 +69,7 @@ def mark_running(database: PhotoDatabase, options: SessionOptions) -> None:
     """From here on, until it is finished, the session has to be gone on with; with these options,
     which ``check_options`` has let pass."""
     database.remember(_OPTIONS, json.dumps(as_dict(options)))
+    database.remember(_FILES, _contents(options))
     database.remember(_STATE, _RUNNING)
 
 
@@ -143,8 +147,8 @@ def nothing_to_do(
     *,
     append: bool,
 ) -> bool:
-    """Whether a finished session holds all these photos, with these positions; asked before
-    anything heavy is loaded.
+    """Whether a finished session holds all these photos, with these positions and control points;
+    asked before anything heavy is loaded.
 
     Raises InputError if the session cannot be continued so, or another process writes to it.
     """
@@ -154,16 +158,29 @@ def nothing_to_do(
     with SessionLock(output), PhotoDatabase(output / DATABASE) as database:
         if not check_options(database, options, output) or not is_finished(database):
             return False
-        if _positions(database) != options.positions:
+        if not _as_before(database, options):
             return False
         newcomers = Newcomers(database, folder, output, append=append)
         return next(newcomers.among(photos, lambda _: None), None) is None
 
 
-def _positions(database: PhotoDatabase) -> PositionOptions:
-    """The options of positions that a session was last gone on with."""
-    stored = json.loads(database.recall(_OPTIONS) or "{}")
-    return PositionOptions(**stored.get(_POSITIONS, {}))  # absent in those of earlier versions
+def _as_before(database: PhotoDatabase, options: SessionOptions) -> bool:
+    """Whether positions and control points are those that the session was last gone on with."""
+    before = json.loads(database.recall(_OPTIONS) or "{}")
+    now, default = as_dict(options), as_dict(SessionOptions())
+    # What is absent was the default: an earlier version did not know it.
+    same = all({**default[name], **before.get(name, {})} == now[name] for name in _ANEW)
+    return same and database.recall(_FILES) in (None, _contents(options))
+
+
+def _contents(options: SessionOptions) -> str:
+    """What tells the files of positions and control points from others of the same names."""
+    digest = hashlib.blake2b(digest_size=16)
+    for file in (Path(options.positions.source), options.control_points.file):
+        # One that cannot be read is told where it is used.
+        with suppress(OSError):
+            digest.update(b"" if file is None else file.read_bytes())
+    return digest.hexdigest()
 
 
 def _same(before: FileState, now: FileState) -> bool:

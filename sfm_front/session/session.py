@@ -31,6 +31,7 @@ from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.session.announcer import Announcer
+from sfm_front.session.control_points import ControlPoints
 from sfm_front.session.hints import hint
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import check_output_folder, open_output_folder
@@ -100,9 +101,9 @@ class Session(Closeable):
         session, as ``events.jsonl`` has them.
 
         Raises InputError if there is such a session and neither is wanted, if it was made with
-        other options, if another process writes to it, or if the file of positions is no such;
-        ConfigError, WeightsError or DependencyError if the global descriptor cannot be had, or a
-        library that positions need. Nothing has been written or removed then.
+        other options, if another process writes to it, or if the file of positions or of control
+        points is no such; ConfigError, WeightsError or DependencyError if the global descriptor
+        cannot be had, or a library that positions need. Nothing has been written or removed then.
         """
         self.options = options or SessionOptions()
         self.output = output
@@ -115,19 +116,27 @@ class Session(Closeable):
             device=device,
         )
         positions = PhotoPositions(self.options.positions)
+        self._announcer = Announcer([] if on_event is None else [on_event])
+        control_points = ControlPoints(self.options.control_points, self._announcer.tell_of_model)
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         self._finished = False
         # Whether the models were settled since the last photo.
         self._is_settled = True
         self._idle_since_s: float | None = None
         self._idle_events: list[ModelEvent] = []
-        self._announcer = Announcer([] if on_event is None else [on_event])
         # What is open is closed again if a later part cannot be made.
         with ExitStack() as opened:
             lock = open_output_folder(output, overwrite=overwrite, resume=resume)
             opened.callback(lock.close)
             self._parts = open_parts(
-                opened, output, self.options, device, descriptor, positions, self._announcer
+                opened,
+                output,
+                self.options,
+                device,
+                descriptor,
+                positions,
+                control_points,
+                self._announcer,
             )
             self._go_on(opened)
             self._opened = opened.pop_all()
@@ -236,6 +245,7 @@ class Session(Closeable):
                 lambda: finish(self._parts.atlas, self._parts.restart, self._georeference)
             )
             self._georeference()
+            self._parts.control_points.hold(self._parts.atlas.models, self._parts.georeferencing)
             audits = [
                 audit(model.reconstruction, self._parts.view_graph)
                 for model in self._parts.atlas.models
@@ -252,6 +262,7 @@ class Session(Closeable):
             seconds=clock.seconds,
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
+            control_points=self._parts.control_points.report,
         )
         write_report(self.output, summary)
         mark_finished(self.database)
@@ -301,7 +312,7 @@ class Session(Closeable):
             len(catalog),
             catalog.colors,
             georeferencing.as_json(),
-            georeferencing.sidecar(models),
+            georeferencing.sidecar(models, self._parts.control_points.report),
             final=final,
             text=text,
         )
@@ -330,6 +341,7 @@ class Session(Closeable):
         unranked = candidates[len(ranked) :]
         outcomes = self._outcomes([*ranked, *unranked], pairs, rejected)
         with clock.stage("store"):
+            parts.control_points.take(photo.name, (photo.width, photo.height))
             prior = parts.positions.take(image_id, photo.name, photo.exif)
             parts.database.write(image_id, photo, view.camera, pairs, outcomes, prior=prior)
         with clock.stage("map"):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 from sfm_front.errors import InputError
-from sfm_front.georeference.control.point_file import ControlPoint, Mark
+from sfm_front.georeference.control.point_file import MIN_POINTS, ControlPoint, Mark
 
 Size = tuple[int, int]
 """Width and height in pixels."""
@@ -29,7 +29,7 @@ class PhotoMark:
 def marks_in_photos(
     points: Sequence[ControlPoint],
     sizes: Mapping[str, Size],
-    marked_size: Size | None = None,
+    marked_size: tuple[int, ...] | None = None,
 ) -> tuple[list[PhotoMark], list[str]]:
     """The marks in these photos (name → size of the file), and the names of other photos.
 
@@ -52,17 +52,31 @@ def marks_in_photos(
     return found, list(missing)
 
 
+def check_photos(file: Path, points: Sequence[ControlPoint], names: Iterable[str]) -> None:
+    """InputError unless, in photos of these names, enough control points have two marks each."""
+    finder = _PhotoFinder(names)
+    control = [point for point in points if not point.is_checkpoint]
+    usable = [p for p in control if sum(finder.find(m) is not None for m in p.marks) >= 2]
+    if len(usable) < MIN_POINTS:
+        absent = next(m.photo for p in control for m in p.marks if finder.find(m) is None)
+        raise InputError(
+            f"{file}: {len(usable)} control points have marks in two or more of the photos given; "
+            f"at least {MIN_POINTS} are needed. {absent}, for one, is not among the photos: names "
+            "are as below their folder."
+        )
+
+
 class _PhotoFinder:
-    def __init__(self, names: Mapping[str, Size]) -> None:
-        self._names = names
+    def __init__(self, names: Iterable[str]) -> None:
+        self._names = dict.fromkeys(names)
         self._by_last_part: dict[str, list[str]] = {}
-        for name in names:
-            self._by_last_part.setdefault(_last_part(name), []).append(name)
+        for name in self._names:
+            self._by_last_part.setdefault(last_part(name), []).append(name)
 
     def find(self, mark: Mark) -> str | None:
         if mark.photo in self._names:
             return mark.photo
-        alike = self._by_last_part.get(_last_part(mark.photo), [])
+        alike = self._by_last_part.get(last_part(mark.photo), [])
         if len(alike) > 1:
             raise InputError(
                 f"line {mark.line} of the control points: {mark.photo} may be {alike[0]} or "
@@ -71,11 +85,14 @@ class _PhotoFinder:
         return alike[0] if alike else None
 
 
-def _last_part(name: str) -> str:
+def last_part(name: str) -> str:
+    """``flight/A.JPG`` → ``a.jpg``"""
     return PurePosixPath(name.replace("\\", "/")).name.casefold()
 
 
-def _pixel(mark: Mark, photo: str, size: Size, marked_size: Size | None) -> tuple[float, float]:
+def _pixel(
+    mark: Mark, photo: str, size: Size, marked_size: tuple[int, ...] | None
+) -> tuple[float, float]:
     width, height = size
     scale = 1.0
     if marked_size is not None:
