@@ -318,7 +318,7 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
         control["file"] = arguments.gcp
     size = _numbers("--gcp-size", arguments.gcp_size)
     if size is not None:
-        if len(size) != 2 or any(side != int(side) or side < 1 for side in size):
+        if len(size) != 2 or any(side % 1 != 0 or side < 1 for side in size):
             raise ConfigError(f"--gcp-size takes width and height, got {arguments.gcp_size!r}")
         control["marked_size"] = tuple(map(int, size))
     given["control_points"] = replace(base.control_points, **control)
