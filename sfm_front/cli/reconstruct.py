@@ -298,7 +298,7 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
         given["pair_matching"] = replace(base.pair_matching, num_matched=arguments.num_matched)
     if arguments.text is not None:
         given["text"] = arguments.text
-    for name in ("seed", "snapshot_seconds", "cache_mb"):
+    for name in ("seed", "snapshot_seconds", "cache_mb", "georegister"):
         if getattr(arguments, name) is not None:
             given[name] = getattr(arguments, name)
     cameras = {

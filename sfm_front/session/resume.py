@@ -23,6 +23,7 @@ _OPTIONS = "options"
 _STATE = "state"
 _RUNNING, _FINISHED = "running", "finished"
 
+# Beside the options: what was in the files that they name.
 _FILES = "files"
 # What comes of these is computed anew whenever a session goes on: no photo is stored with more than
 # its own EXIF.
@@ -68,8 +69,8 @@ def check_options(database: PhotoDatabase, options: SessionOptions, output: Path
 def mark_running(database: PhotoDatabase, options: SessionOptions) -> None:
     """From here on, until it is finished, the session has to be gone on with; with these options,
     which ``check_options`` has let pass."""
-    database.remember(_OPTIONS, json.dumps(as_dict(options)))
-    database.remember(_FILES, _contents(options))
+    content = {**as_dict(options), _FILES: _contents(options)}
+    database.remember(_OPTIONS, json.dumps(content))
     database.remember(_STATE, _RUNNING)
 
 
@@ -170,7 +171,7 @@ def _as_before(database: PhotoDatabase, options: SessionOptions) -> bool:
     now, default = as_dict(options), as_dict(SessionOptions())
     # What is absent was the default: an earlier version did not know it.
     same = all({**default[name], **before.get(name, {})} == now[name] for name in _ANEW)
-    return same and database.recall(_FILES) in (None, _contents(options))
+    return same and before.get(_FILES) in (None, _contents(options))
 
 
 def _contents(options: SessionOptions) -> str:

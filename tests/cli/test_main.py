@@ -15,6 +15,7 @@ from PIL import Image
 
 from sfm_front.cli import reconstruct, retrieve
 from sfm_front.cli.main import main
+from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.search.folder_search import SearchOptions
 from sfm_front.session.options import SessionOptions, available_cores
 
@@ -76,6 +77,10 @@ DEFAULTS_OF = {
         "--seed": SESSION.seed,
         "--camera-mode": SESSION.cameras.mode,
         "--camera-model": SESSION.cameras.model,
+        "--gps": SESSION.positions.source,
+        "--gps-accuracy": "5,10; without V, twice H",
+        "--georegister": SESSION.georegister,
+        "--gcp-accuracy": "0.02,0.03; without V, twice H",
         "--num-matched": SESSION.pair_matching.num_matched,
         "--snapshot-seconds": f"{SESSION.snapshot_seconds:g}",
         "--cache-mb": "a quarter of the machine's memory, at most 2048",
@@ -105,6 +110,21 @@ def test_what_is_not_given_is_the_sessions_default():
     arguments = parser().parse_args(["folder"])
     assert reconstruct.session_options(arguments) == SessionOptions(
         atlas=reconstruct.session_options(arguments).atlas
+    )
+
+
+def test_models_stay_in_their_own_frame_where_that_is_wanted():
+    given = parser().parse_args(["folder", "--georegister", "off"])
+    assert reconstruct.session_options(given).georegister == "off"
+
+
+def test_control_points_are_taken_as_given():
+    given = ("--gcp", "gcp.txt", "--gcp-size", "4272,2848", "--gcp-accuracy", "0.5")
+    assert reconstruct.session_options(parser().parse_args(given)).control_points == ControlOptions(
+        file=Path("gcp.txt"),
+        marked_size=(4272, 2848),
+        horizontal_sigma_m=0.5,
+        vertical_sigma_m=1.0,
     )
 
 
@@ -168,6 +188,13 @@ def test_a_file_in_place_of_a_folder(photo, tmp_path, capsys):
         (["--candidates", "0"], "candidates must be at least 1, got 0"),
         (["--matched", "0"], "matched must be at least 1, got 0"),
         (["--threads", "0"], "threads must be at least 1, got 0"),
+        (["--gcp", "none.txt"], "none.txt: cannot be read: No such file"),
+        (["--gcp-accuracy", "1,2,3"], "--gcp-accuracy takes one or two numbers, got 3"),
+        (["--gcp-accuracy", "0"], "horizontal_sigma_m must be a number above 0"),
+        (["--gcp-size", "4000"], "--gcp-size takes width and height, got '4000'"),
+        (["--gcp-size", "4000,2.5"], "--gcp-size takes width and height, got '4000,2.5'"),
+        (["--gcp-size", "inf,inf"], "--gcp-size takes width and height, got 'inf,inf'"),
+        (["--gcp", "none.txt", "--georegister", "off"], "leave georegister = off out"),
         (["--global-descriptor", "bag"], "no global descriptor is called 'bag'"),
         (["--global-descriptor", "vlad", "--weights", "none.pth"], "--weights goes with one"),
     ],
@@ -177,6 +204,16 @@ def test_options_that_cannot_be(photo, tmp_path, capsys, given, message):
     line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out", *given)
     assert message in line
     assert line.startswith("sfm-front reconstruct: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_control_points_of_other_photos(photo, tmp_path, capsys):
+    file = tmp_path / "gcp.txt"
+    marks = [f"9.{i} 48.{i * i} 300 10 10 {name}" for i in range(3) for name in ("x.jpg", "y.jpg")]
+    file.write_text("\n".join(["EPSG:4326", *marks]))
+    line = refused(capsys, "reconstruct", photo, "--output", tmp_path / "out", "--gcp", file)
+    assert "0 control points have marks in two or more of the photos given" in line
+    assert "x.jpg, for one, is not among the photos" in line
     assert not (tmp_path / "out").exists()
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from sfm_front.cli import progress
 from sfm_front.cli.progress import CountLine, ProgressLine
-from sfm_front.events import ModelRefined, PhotoAdded
+from sfm_front.events import ControlPointsRefused, ModelRefined, PhotoAdded
 from sfm_front.types import Skipped, SkipReason
 
 
@@ -103,6 +103,16 @@ def test_what_becomes_of_models_is_no_photo(turn):
     turn(1.0)
     line.show(placed("a.jpg", 0, 0))
     assert stream.getvalue().startswith("photo 1/2")
+
+
+def test_what_can_be_mended_while_photos_come_is_told_then_and_else_in_the_summary():
+    stream = io.StringIO()
+    line = ProgressLine(stream)
+    line.show(ControlPointsRefused("line 7 is wrong."))
+    line.finishing()
+    line.show(ControlPointsRefused("line 8 is wrong."))
+    first, _ = stream.getvalue().splitlines()
+    assert first == "control points cannot be used: line 7 is wrong."
 
 
 def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):

@@ -179,3 +179,17 @@ def test_rows_are_in_the_order_of_flight_whatever_the_ids(photos):
     }
     found = Georeferencer().update(posed(photos), positions)
     assert found.image_ids == tuple(range(40, 0, -1))
+
+
+def test_a_model_that_something_better_holds_is_compared_and_not_moved(photos):
+    photos.enu[:] += np.array([30.0, -20.0, 50.0])
+    referencer, poses = Georeferencer(), posed(photos, moved=photos.enu_from_model)
+    found = referencer.compare(poses, measured(photos), SITE, "held to 4 points")
+    assert (found.state, found.frame) == (GeoreferenceState.METRIC, SITE)
+    assert found.reasons == ("held to 4 points",)
+    assert referencer.frame is None
+    rows = np.array(found.image_ids) - 1
+    off = photos.enu[rows] - photos.true[rows]
+    np.testing.assert_allclose(found.alignment.residuals, off, atol=1e-6)
+    none = referencer.compare(poses, {}, SITE, "held to 4 points")
+    assert (none.state, none.alignment) == (GeoreferenceState.METRIC, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pycolmap
@@ -14,6 +15,7 @@ from sfm_front.errors import InputError
 from sfm_front.geometry.enu import LocalFrame
 from sfm_front.georeference import sidecar as sidecar_module
 from sfm_front.georeference.alignment import align
+from sfm_front.georeference.control.report import ControlReport
 from sfm_front.georeference.georeferencer import Georeference
 from sfm_front.georeference.sidecar import (
     FILE_NAME,
@@ -87,6 +89,17 @@ def test_no_georeference_is_said_too(tmp_path):
     write_sidecar(tmp_path / FILE_NAME, nothing)
     assert read_sidecar(tmp_path / FILE_NAME) == nothing
     assert nothing.state is GeoreferenceState.NONE
+
+
+def test_control_points_come_back_and_may_be_absent(full, tmp_path):
+    control = ControlReport(file="gcp_list.txt", not_used="line 3 is wrong", missing_photos=("a",))
+    file = tmp_path / FILE_NAME
+    write_sidecar(file, replace(full, control_points=control))
+    assert read_sidecar(file).control_points == control
+    row = json.loads(file.read_text(encoding="utf-8"))
+    del row["control_points"]  # as files of earlier versions
+    file.write_text(json.dumps(row), encoding="utf-8")
+    assert read_sidecar(file).control_points is None
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"version": 1}'])

@@ -152,10 +152,12 @@ def test_a_finished_session_has_something_to_do_with_other_positions(photos, tmp
     add(output, options(source=str(file)), [], end=True)
     assert is_done(options(source=str(file)))
     assert not is_done(options())
+    file.write_text(file.read_text().replace("47.5", "47.4"))
+    assert not is_done(options(source=str(file)))
     # An earlier version knew of no such options, and took EXIF.
     with PhotoDatabase(output / "database.db") as database:
         stored = json.loads(database.recall("options") or "")
-        del stored["positions"]
+        del stored["positions"], stored["files"]
         database.remember("options", json.dumps(stored))
     assert is_done(options())
     assert not is_done(options(source="off"))

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sfm_front.georeference.control.marks import PhotoMark
-from sfm_front.georeference.control.point_file import ControlPoint
-from sfm_front.georeference.control.triangulation import MarkedPlace
-from sfm_front.types import Float64Array
+if TYPE_CHECKING:  # Reports hold these residuals, and load nothing heavy.
+    from sfm_front.georeference.control.marks import PhotoMark
+    from sfm_front.georeference.control.point_file import ControlPoint
+    from sfm_front.georeference.control.triangulation import MarkedPlace
+    from sfm_front.types import Float64Array
 
 
 class PointRole(Enum):

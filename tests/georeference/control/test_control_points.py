@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from helpers.control_making import FRAME, K1, Flight, bent, displaced, make_flight
 
-from sfm_front.errors import ConfigError
 from sfm_front.geometry.similarity import Similarities
 from sfm_front.georeference.control.control_points import (
     ControlResult,
@@ -190,8 +189,3 @@ def test_photos_that_are_not_in_the_model_are_passed_over(flight, rng):
     assert point.role is PointRole.NOT_MEASURED
     assert point.east_m is None
     assert result.control.count == 7
-
-
-def test_options_check_themselves():
-    with pytest.raises(ConfigError, match="horizontal_sigma_m"):
-        ControlOptions(horizontal_sigma_m=0)

@@ -1,7 +1,9 @@
+from pathlib import Path
+
 import pytest
 
 from sfm_front.errors import InputError
-from sfm_front.georeference.control.marks import PhotoMark, marks_in_photos
+from sfm_front.georeference.control.marks import PhotoMark, check_photos, marks_in_photos
 from sfm_front.georeference.control.point_file import ControlPoint, Mark
 from sfm_front.types import GeoPosition
 
@@ -46,3 +48,15 @@ def test_a_mark_outside_its_photo_says_how_to_mend_it():
 def test_a_size_of_another_shape_is_refused():
     with pytest.raises(InputError, match="another shape than the 1600 x 900"):
         marks_in_photos([point("a.jpg")], {"a.jpg": (400, 300)}, (1600, 900))
+
+
+def test_enough_of_the_photos_given_must_have_marks():
+    points = [
+        ControlPoint(
+            name, GeoPosition(48, 9), (Mark("a.jpg", 1, 1, 2), Mark("b.jpg", 1, 1, 3)), name == "c"
+        )
+        for name in "abcd"
+    ]
+    check_photos(Path("gcp.txt"), points, ["day/a.jpg", "day/b.jpg"])
+    with pytest.raises(InputError, match=r"gcp.txt: 0 control points .* b.jpg, for one, is not"):
+        check_photos(Path("gcp.txt"), points, ["day/a.jpg", "day/c.jpg"])
