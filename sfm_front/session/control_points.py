@@ -47,9 +47,11 @@ class ControlPoints:
         self.report: ControlReport | None = None
 
     def take(self, name: str, size: Size) -> None:
-        """Look at the marks in a photo, new or restored: what is wrong with them is told now, while
-        it can be mended."""
+        """Look at the marks in a photo, new or restored: the first thing that is wrong is told now,
+        while it can be mended."""
         self._sizes[name] = size
+        if self._refused:
+            return
         if name not in self._marked and last_part(name) not in self._marked:
             return
         try:
@@ -138,7 +140,6 @@ class ControlPoints:
         return result
 
     def _refuse(self, reason: str) -> None:
-        """Tell it, once."""
         if reason != self._refused:
             self._refused = reason
             self._emit(ControlPointsRefused(reason))

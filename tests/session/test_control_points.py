@@ -219,7 +219,8 @@ def test_points_far_from_the_positions_are_refused(tmp_path, photos, rows, strip
 
 def test_a_mark_outside_its_photo_is_told_at_once_and_spoils_nothing(tmp_path, photos, rows, strip):
     wrong = replace(rows[0], xy=(1700.0, 100.0))
-    file = write_gcp_list(tmp_path / "gcp_list.txt", [wrong, *rows[1:]])
+    later = replace(rows[-1], xy=(1800.0, 100.0))
+    file = write_gcp_list(tmp_path / "gcp_list.txt", [wrong, *rows[1:-1], later])
     events: list[Event] = []
     out = tmp_path / "out"
     result = run(out, photos, options(file), events)
