@@ -11,7 +11,7 @@ import pycolmap
 
 from sfm_front.events import Emit, ModelRefined
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
-from sfm_front.mapping.bundle_adjustment import robust_adjustment
+from sfm_front.mapping.bundle_adjustment import robust_adjustment, solved_directly
 from sfm_front.mapping.calibration import impossible_photos, is_miscalibrated
 from sfm_front.mapping.camera_motion import camera_centers, camera_motion
 from sfm_front.mapping.carry_over import Before, carry_over
@@ -377,7 +377,7 @@ class Model:
             pipeline.ba_global_max_refinements,
             pipeline.ba_global_max_refinement_change,
             self._mapping,
-            pipeline.get_global_bundle_adjustment(),
+            solved_directly(pipeline.get_global_bundle_adjustment()),
             self._triangulation,
             normalize_reconstruction=not self.is_georeferenced,
         )
