@@ -20,6 +20,7 @@ from sfm_front.events import (
     SessionStarted,
 )
 from sfm_front.features.global_descriptors.descriptor import resolve
+from sfm_front.georeference.georeferencer import Georeference
 from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.unfolding import unfold
@@ -136,6 +137,12 @@ class Session(Closeable):
     def database(self) -> PhotoDatabase:
         """What is known of all photos."""
         return self._parts.database
+
+    @property
+    def georeference(self) -> Georeference:
+        """Where the largest model stands on the earth, as far as positions told when it was looked
+        at last."""
+        return self._parts.georeferencing.georeference
 
     def _go_on(self, opened: ExitStack) -> None:
         """Where an earlier run of this session stopped, if there was one."""
