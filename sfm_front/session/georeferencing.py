@@ -16,6 +16,7 @@ from sfm_front.georeference.georeferencer import Georeference, Georeferencer, Ph
 from sfm_front.georeference.sidecar import Sidecar, sidecar_of
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.mapping.model import Model
+from sfm_front.reports.run_summary import GeoreferenceOutcome
 from sfm_front.session.photo_positions import PhotoPositions
 
 # Looked at again once there are more positions by this factor: later ones hardly move the frame.
@@ -74,6 +75,18 @@ class Georeferencing:
             enu_from_built=self._enu_from_built.get(largest.model_id),
             models_in_enu=tuple(n for n, model in enumerate(models) if model.is_georeferenced),
             flight=figures,
+        )
+
+    def outcome(self, models: Sequence[Model]) -> GeoreferenceOutcome | None:
+        """What the report says of finished models; None where nothing is known of positions."""
+        sidecar = self.sidecar(models, is_final=True)
+        unused = self._positions.num_unused_rows
+        if sidecar is None and not unused:
+            return None
+        return GeoreferenceOutcome(
+            sidecar=sidecar,
+            num_unused_rows=unused,
+            kept_positions=models[0].is_held_to_positions if models else None,
         )
 
     def as_json(self) -> dict[str, Any]:
