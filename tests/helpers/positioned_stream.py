@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pycolmap
-from helpers.photo_stream import centre_of, described
 
+from helpers.photo_stream import centre_of, described
 from sfm_front.evaluation.synthetic.scene import SyntheticScene
 from sfm_front.geometry.enu import LocalFrame
 from sfm_front.mapping.atlas import AtlasOptions
