@@ -32,9 +32,9 @@ class NeverDone:
 def test_no_model_is_refined_in_the_background_before_its_last_adjustment():
     adjuster, seen = NeverDone(), []
     options = AtlasOptions(mapper=MapperOptions(num_threads=1))
-    orbit = make_scene(NUM_PHOTOS, 400, seed=3, layout="orbit")
-    atlas = Atlas(SceneFeed(orbit).scene, options, adjuster=adjuster)
-    feed = SceneFeed(orbit, atlas.view_graph)
+    flight = make_scene(NUM_PHOTOS, 250, seed=3, layout="strip")
+    atlas = Atlas(SceneFeed(flight).scene, options, adjuster=adjuster)
+    feed = SceneFeed(flight, atlas.view_graph)
     for index in range(NUM_PHOTOS):
         atlas.add(feed.add(index))
     atlas.settle()
