@@ -32,9 +32,10 @@ def georeference_lines(outcome: GeoreferenceOutcome) -> list[str]:
         lines.append(
             "the photos contradict the positions: the last adjustment is by the photos alone"
         )
-    if outcome.num_unused_rows:
-        rows = "row" if outcome.num_unused_rows == 1 else "rows"
-        lines.append(f"{outcome.num_unused_rows} {rows} of the file of positions name no photo")
+    unused = outcome.num_unused_rows
+    if unused:
+        rows, name = ("row", "names") if unused == 1 else ("rows", "name")
+        lines.append(f"{unused} {rows} of the file of positions {name} no photo")
     return lines
 
 
