@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ from sfm_front.georeference.sidecar import FILE_NAME, Sidecar, read_sidecar
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.photos.position_checks import LeftOut
 from sfm_front.photos.positions import PositionOptions
+from sfm_front.reports.explanation import explain
 from sfm_front.reports.run_summary import RunSummary
 from sfm_front.reports.summary import closing_summary
 from sfm_front.session import snapshots
@@ -274,6 +276,10 @@ class TestBadPositions:
         assert outlier.metres == pytest.approx(200, abs=4)
         assert (np.abs(result.errors_m(flight)) < TOLERANCE_M).all()
         assert "positions left out: 000007.jpg 20" in told(result)
+        said = str(explain(result.output, "000007.jpg"))
+        assert re.search(r"its position is (19[89]|20[0-2])\.\d\d m away in the plane", said)
+        assert "taken for wrong" in said
+        assert "taken for wrong" not in str(explain(result.output, "000008.jpg"))
 
     def test_a_flight_that_is_15_m_too_high_is_named(self, flight, without, enu, tmp_path):
         enu[SECOND_FLIGHT_FROM:, 2] += 15
@@ -298,6 +304,8 @@ class TestBadPositions:
         }
         assert (np.abs(result.errors_m(flight)) < TOLERANCE_M).all()
         assert LeftOut.NO_ALTITUDE.value in told(result)
+        said = str(explain(result.output, flight.name(bad[0])))
+        assert f"its position is left out: {LeftOut.NO_ALTITUDE.value}" in said
 
     def test_photos_without_gps_among_others(self, flight, without, enu, tmp_path):
         positions = [p if i % 3 else None for i, p in enumerate(positions_at(enu))]
