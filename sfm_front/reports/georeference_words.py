@@ -60,7 +60,7 @@ def _of_models(sidecar: Sidecar) -> Iterator[str]:
         )
         yield f"heights differ from those of the other flights: {', '.join(offsets)}"
     if is_metric and residuals is not None and residuals.bend is not None:
-        yield _bend(residuals.bend, residuals.up)
+        yield _bend(residuals.bend, residuals.up, is_flight=sidecar.flight is not None)
     if sidecar.flight is not None:
         yield _flight(sidecar.flight)
 
@@ -99,9 +99,9 @@ def _left_out(reasons: Mapping[str, str]) -> list[str]:
     return [f"{count} × {why}" for why, count in counted.items()]
 
 
-def _bend(bend: Bend, up: AxisResiduals | None) -> str:
+def _bend(bend: Bend, up: AxisResiduals | None, *, is_flight: bool) -> str:
     is_bent = bend.share_of_extent > _BENT_SHARE and (
-        up is not None and bend.metres > _BENT_PER_RMS * up.rms
+        is_flight and up is not None and bend.metres > _BENT_PER_RMS * up.rms
     )
     helps = "; a known camera, oblique photos or control points help" if is_bent else ""
     return (
