@@ -61,6 +61,8 @@ class Model:
         # 0 until whoever starts it gives it another.
         self.model_id = 0
         self.is_georeferenced = False
+        # Whether the last adjustment kept to positions; None if it was not asked to.
+        self.is_held_to_positions: bool | None = None
         self._priors: PositionPriors | None = None
         self._view_graph = view_graph
         self._options = options
@@ -256,6 +258,10 @@ class Model:
         """Whether it is being refined in the background."""
         return self._under_way is not None
 
+    def leave_refinement(self) -> None:
+        """What is refined in the background is not waited for: all of it will be done at once."""
+        self._under_way = None
+
     def georeference(self, enu_from_world: pycolmap.Sim3d, priors: PositionPriors) -> None:
         """Move the world to the frame of these positions, to which it is held from now on.
 
@@ -285,10 +291,12 @@ class Model:
         self.reconstruction = final_adjustment(
             self.reconstruction, self._options.robust, self._options.calibration
         )
-        if self._priors is not None:
-            self.reconstruction = held_to_positions(
+        if self._priors is not None and self._priors.are_enough:
+            held = held_to_positions(
                 self.reconstruction, self._priors, self._options.robust, self._options.priors
             )
+            self.is_held_to_positions = held is not None
+            self.reconstruction = held or self.reconstruction
         if not self.is_miscalibrated:
             for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)

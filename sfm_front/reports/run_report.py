@@ -21,6 +21,7 @@ from sfm_front.events import (
 from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.run_summary import (
     AuditOutcome,
+    GeoreferenceOutcome,
     Latency,
     ModelOutcome,
     Outcome,
@@ -71,6 +72,7 @@ class RunReport:
         seconds: Mapping[str, float],
         events: Sequence[ModelEvent],
         latencies_s: Sequence[float],
+        georeference: GeoreferenceOutcome | None = None,
     ) -> RunSummary:
         """Sum up.
 
@@ -100,6 +102,7 @@ class RunReport:
             end_events=_in_words(events),
             totals=self._totals(models, len(model_of), seconds, latencies_s),
             look_alikes=self._look_alikes(events),
+            georeference=georeference,
         )
 
     def _look_alikes(self, events: Iterable[ModelEvent]) -> tuple[tuple[tuple[str, ...], ...], ...]:

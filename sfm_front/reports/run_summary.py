@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.types import Skipped
 
 
@@ -108,6 +109,21 @@ class Totals:
     latency: Latency | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GeoreferenceOutcome:
+    """What measured positions say of the models.
+
+    ``sidecar``: as ``georeference.json`` has it; None if no photo has a position, or nobody wants
+    to know. ``num_unused_rows`` of a file of positions name no photo. ``kept_positions``: whether
+    the last adjustment of the largest model used them; False if they and the photos contradict each
+    other, None if they were not tried.
+    """
+
+    sidecar: Sidecar | None
+    num_unused_rows: int = 0
+    kept_positions: bool | None = None
+
+
 Outcome: TypeAlias = Skipped | PhotoOutcome
 
 
@@ -116,7 +132,8 @@ class RunSummary:
     """Photos in order of arrival, models largest first, and how the session ended.
 
     ``end_events`` are those of idle times, too. ``look_alikes``: names of the photos of two groups
-    that show things that look alike, each time a model was taken apart for it.
+    that show things that look alike, each time a model was taken apart for it. ``georeference``:
+    None where nothing is known of positions.
     """
 
     photos: tuple[Outcome, ...]
@@ -125,6 +142,7 @@ class RunSummary:
     end_events: tuple[str, ...]
     totals: Totals
     look_alikes: tuple[tuple[tuple[str, ...], ...], ...] = ()
+    georeference: GeoreferenceOutcome | None = None
 
     @property
     def used(self) -> list[PhotoOutcome]:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from sfm_front.reports.georeference_words import georeference_lines
 from sfm_front.reports.run_summary import AuditOutcome, RunSummary
 
 # Photos of a doubtful group; report.json names all.
@@ -29,6 +30,8 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
         )
         if model.audit and model.audit.is_doubtful:
             lines.append(f"    {_doubt(model.audit)}")
+    if summary.georeference is not None:
+        lines += georeference_lines(summary.georeference)
     photos = max(totals.num_photos, 1)
     stages = ", ".join(
         f"{stage} {seconds / photos:.3f}" for stage, seconds in totals.seconds_by_stage.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple
 from typing import Any
 
@@ -11,10 +11,12 @@ import pycolmap
 
 from sfm_front.events import Emit, Georeferenced
 from sfm_front.geometry.exif_orientation import upright_from_cam
+from sfm_front.georeference.flight_figures import flight_figures
 from sfm_front.georeference.georeferencer import Georeference, Georeferencer, PhotoPosition
 from sfm_front.georeference.sidecar import Sidecar, sidecar_of
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.mapping.model import Model
+from sfm_front.reports.run_summary import GeoreferenceOutcome
 from sfm_front.session.photo_positions import PhotoPositions
 
 # Looked at again once there are more positions by this factor: later ones hardly move the frame.
@@ -24,7 +26,7 @@ _GROWTH = 1.05
 class Georeferencing:
     """Turns models into a frame of the earth as soon as positions of their photos fix it.
 
-    ``georeference`` is that of the largest model.
+    ``georeference`` is that of the largest model, as it was looked at last.
     """
 
     def __init__(self, positions: PhotoPositions, emit: Emit, *, seed: int, is_on: bool) -> None:
@@ -34,41 +36,57 @@ class Georeferencing:
         self._georeferencer = Georeferencer(seed=seed)
         self.georeference = Georeference()
         self._told: tuple[int, GeoreferenceState] | None = None
-        self._num_looked_at = 0
+        # Model id → positions that there were when it was looked at.
+        self._looked_at: dict[int, int] = {}
         # Model id → from the frame in which it was built.
         self._enu_from_built: dict[int, pycolmap.Sim3d] = {}
 
     def follow(self, models: Sequence[Model]) -> None:
-        """After each photo: look at the models if there are clearly more positions than before."""
-        if len(self._positions) >= max(_GROWTH * self._num_looked_at, self._num_looked_at + 1):
-            self.settle(models)
+        """After each photo: look at models that are new, or have been looked at with clearly fewer
+        positions."""
+        self._look_at_all(models, self._is_due)
 
     def settle(self, models: Sequence[Model]) -> None:
         """Look at all models, the largest first, and move those whose place is known."""
-        if not self._is_on or not len(self._positions):
-            return
-        self._num_looked_at = len(self._positions)
-        measured = self._positions.measured(self._positions.checked().usable)
-        for number, model in enumerate(models):
-            if not model.is_under_way:  # else next time
-                self._look_at(model, measured, is_largest=number == 0)
+        self._look_at_all(models, lambda _: True)
 
-    def sidecar(self, models: Sequence[Model]) -> Sidecar | None:
-        """What ``georeference.json`` says of the largest model as ``settle`` has left it; None if
-        there are no positions."""
+    def sidecar(self, models: Sequence[Model], *, is_final: bool = False) -> Sidecar | None:
+        """What ``georeference.json`` says of the largest model as it stands; None if there are no
+        positions. ``is_final``: with the figures of the flight."""
         if not self._is_on or not len(self._positions):
             return None
+        checked, names = self._positions.checked(), self._positions.names
+        left_out = {names[image_id]: reason.value for image_id, reason in checked.left_out.items()}
         if not models:
-            return Sidecar(state=GeoreferenceState.NONE, reasons=("there is no model",))
-        names = self._positions.names
-        left_out = self._positions.checked().left_out
+            return Sidecar(
+                state=GeoreferenceState.NONE, reasons=("there is no model",), left_out=left_out
+            )
+        largest = models[0]
+        figures = None
+        if is_final and largest.is_georeferenced:
+            figures = flight_figures(largest.reconstruction, pycolmap.Sim3d())
         return sidecar_of(
-            self.georeference,
-            _cam_from_world(models[0]),
+            # Photos may have left it since it was looked at, or another one is the largest now.
+            self._georeferencer.look_at(
+                self._poses(largest), self._positions.measured(checked.usable)
+            ),
             names,
-            {names[image_id]: reason.value for image_id, reason in left_out.items()},
-            enu_from_built=self._enu_from_built.get(models[0].model_id),
+            left_out,
+            enu_from_built=self._enu_from_built.get(largest.model_id),
             models_in_enu=tuple(n for n, model in enumerate(models) if model.is_georeferenced),
+            flight=figures,
+        )
+
+    def outcome(self, models: Sequence[Model]) -> GeoreferenceOutcome | None:
+        """What the report says of finished models; None where nothing is known of positions."""
+        sidecar = self.sidecar(models, is_final=True)
+        unused = self._positions.num_unused_rows
+        if sidecar is None and not unused:
+            return None
+        return GeoreferenceOutcome(
+            sidecar=sidecar,
+            num_unused_rows=unused,
+            kept_positions=models[0].is_held_to_positions if models else None,
         )
 
     def as_json(self) -> dict[str, Any]:
@@ -91,14 +109,35 @@ class Georeferencing:
             for model_id, n in row["enu_from_built"].items()
         }
 
+    def _is_due(self, model: Model) -> bool:
+        before = self._looked_at.get(model.model_id, 0)
+        return len(self._positions) >= max(_GROWTH * before, before + 1)
+
+    def _look_at_all(self, models: Sequence[Model], is_due: Callable[[Model], bool]) -> None:
+        if not self._is_on or not len(self._positions):
+            return
+        # One that is being refined in the background: next time.
+        due = [n for n, model in enumerate(models) if not model.is_under_way and is_due(model)]
+        if not due:
+            return
+        measured = self._positions.measured(self._positions.checked().usable)
+        for number in due:
+            self._looked_at[models[number].model_id] = len(self._positions)
+            self._look_at(models[number], measured, is_largest=number == 0)
+
+    def _poses(self, model: Model) -> dict[int, pycolmap.Rigid3d]:
+        """Of its photos as they were held."""
+        reconstruction, orientation_of = model.reconstruction, self._positions.orientation_of
+        return {
+            i: upright_from_cam(orientation_of(i)) * reconstruction.image(i).cam_from_world()
+            for i in reconstruction.reg_image_ids()
+        }
+
     def _look_at(
         self, model: Model, measured: Mapping[int, PhotoPosition], *, is_largest: bool
     ) -> None:
         look = self._georeferencer.update if is_largest else self._georeferencer.look_at
-        poses = {
-            image_id: upright_from_cam(self._positions.orientation_of(image_id)) * cam_from_world
-            for image_id, cam_from_world in _cam_from_world(model).items()
-        }
+        poses = self._poses(model)
         found = look(poses, measured)
         if found.state is GeoreferenceState.METRIC and found.alignment is not None:
             moved = found.alignment.enu_from_model
@@ -128,8 +167,3 @@ class Georeferencing:
                 reasons=found.reasons,
             )
         )
-
-
-def _cam_from_world(model: Model) -> dict[int, pycolmap.Rigid3d]:
-    reconstruction = model.reconstruction
-    return {i: reconstruction.image(i).cam_from_world() for i in reconstruction.reg_image_ids()}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sfm_front.errors import InputError
 from sfm_front.exporters.colmap import STATE
+from sfm_front.georeference.sidecar import FILE_NAME as SIDECAR
 from sfm_front.reports import event_log, report_json, retrieval_log
 from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.database import DATABASE
@@ -139,8 +140,10 @@ def _foreign(output: Path) -> Iterator[Path]:
             yield folder
             continue
         for model in folder.iterdir():
-            is_state = model.name == STATE or is_partial(model.name, STATE)
-            if is_state and _is_own_file(model):
+            is_ours = any(
+                model.name == name or is_partial(model.name, name) for name in (STATE, SIDECAR)
+            )
+            if is_ours and _is_own_file(model):
                 continue
             if model.is_symlink() or not model.is_dir() or not _MODEL_NAME.fullmatch(model.name):
                 yield model

@@ -25,6 +25,8 @@ def finished(folder: Path) -> Path:
     model.mkdir(parents=True)
     for name in ("cameras.bin", "images.bin", "points3D.bin", "points3D.ply"):
         (model / name).write_bytes(b"model")
+    for name in ("session.json", "georeference.json"):
+        (folder / "sparse" / name).write_bytes(b"of the models")
     for name in ("database.db", "retrieval.jsonl", "report.json"):
         (folder / name).write_bytes(b"output")
     return folder
