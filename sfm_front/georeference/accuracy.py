@@ -90,7 +90,8 @@ def bend_of_heights(enu: Float64Array, heights: Float64Array) -> Bend | None:
     """The curved part of height residuals (N,) in metres at positions (N, 3).
 
     A quadratic surface less a plane, each the best by least squares; its range is taken over the
-    positions, the extent is the diagonal of their box. None for fewer than ten known heights.
+    positions, the extent is the diagonal of their box. None for fewer than ten known heights, or if
+    it is larger than the extent: then the scale is not known.
     """
     known = np.isfinite(heights)
     if known.sum() < _MIN_HEIGHTS_FOR_BEND:
@@ -104,7 +105,7 @@ def bend_of_heights(enu: Float64Array, heights: Float64Array) -> Bend | None:
     curved = np.column_stack([flat, east**2, east * north, north**2])
     curved_part = _fitted(curved, heights[known]) - _fitted(flat, heights[known])
     metres = float(np.ptp(curved_part))
-    return Bend(metres, metres / extent)
+    return Bend(metres, metres / extent) if metres <= extent else None
 
 
 def _fitted(columns: Float64Array, values: Float64Array) -> Float64Array:

@@ -48,8 +48,8 @@ class Georeference:
     """Where a model stands on the earth.
 
     ``frame``: None until a model was aligned. ``alignment``: of the model as it was given, None in
-    state NONE; its rows, and those of ``fixes``, belong to the photos ``image_ids``. ``reasons``:
-    as in ``Verdict``.
+    state NONE; its rows, those of ``fixes`` and the poses ``cam_from_model`` belong to the photos
+    ``image_ids``. ``reasons``: as in ``Verdict``.
     ``held``: the newest estimate is not taken, and the reason says why; the frame is where it was.
     """
 
@@ -58,6 +58,7 @@ class Georeference:
     alignment: Alignment | None = None
     fixes: Fixes | None = None
     image_ids: tuple[int, ...] = ()
+    cam_from_model: tuple[pycolmap.Rigid3d, ...] = ()
     reasons: tuple[str, ...] = ()
     held: bool = False
 
@@ -141,6 +142,7 @@ class Georeferencer:
             alignment=alignment,
             fixes=fixes,
             image_ids=tuple(ids),
+            cam_from_model=tuple(poses),
             reasons=verdict.reasons,
             held=bool(refused),
         )
@@ -171,7 +173,13 @@ class Georeferencer:
         raised = fixes.raised(alignment.height_offsets)
         residuals = np.where(fixes.known, raised.enu - camera_centres(poses), np.nan)
         stays = replace(alignment, enu_from_model=pycolmap.Sim3d(), residuals=residuals)
-        return replace(metric, alignment=stays, fixes=fixes, image_ids=tuple(ids))
+        return replace(
+            metric,
+            alignment=stays,
+            fixes=fixes,
+            image_ids=tuple(ids),
+            cam_from_model=tuple(poses),
+        )
 
     def as_json(self) -> dict[str, Any]:
         """What a resumed session needs to hold the frame; read by ``restore``."""

@@ -22,6 +22,7 @@ from sfm_front.georeference.accuracy import (
 )
 from sfm_front.georeference.anchors import camera_centres
 from sfm_front.georeference.control.report import ControlReport
+from sfm_front.georeference.flight_figures import FlightFigures
 from sfm_front.georeference.georeferencer import Georeference
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.storage.json_files import write_json
@@ -55,7 +56,8 @@ class Sidecar:
 
     ``models_in_enu``: numbers of those beside it that are in ENU. ``enu_from_built``: from the
     frame in which the largest was built. ``names``: of the photos of outliers, by image id.
-    ``left_out``: photos whose position was not fit for use, by name, and why.
+    ``left_out``: photos whose position was not fit for use, by name, and why. ``flight``: of the
+    largest model, once it is finished and in ENU.
     """
 
     state: GeoreferenceState
@@ -68,29 +70,32 @@ class Sidecar:
     names: Mapping[int, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
     height_offsets_m: Mapping[int, float] = field(default_factory=dict)
+    flight: FlightFigures | None = None
     control_points: ControlReport | None = None
 
 
 def sidecar_of(
     georeference: Georeference,
-    cam_from_model: Mapping[int, pycolmap.Rigid3d],
     names: Mapping[int, str],
     left_out: Mapping[str, str],
     *,
     enu_from_built: pycolmap.Sim3d | None,
     models_in_enu: tuple[int, ...],
+    flight: FlightFigures | None = None,
 ) -> Sidecar:
-    """``cam_from_model``: the poses that the georeference was made from; ``names`` of its photos.
-    Both by image id."""
+    """Of the largest model; ``names`` of the photos of its georeference, by image id."""
     alignment = georeference.alignment
     if alignment is None:
         return Sidecar(
             state=georeference.state,
             reasons=georeference.reasons,
             origin=georeference.frame,
+            models_in_enu=models_in_enu,
+            enu_from_built=enu_from_built,
             left_out=left_out,
+            flight=flight,
         )
-    centres = camera_centres([cam_from_model[image_id] for image_id in georeference.image_ids])
+    centres = camera_centres(georeference.cam_from_model)
     east, north, up = alignment.position_sigmas_m(centres.mean(axis=0)[None])[0].tolist()
     residuals = summarise(alignment, centres, georeference.image_ids)
     return Sidecar(
@@ -109,39 +114,41 @@ def sidecar_of(
         names={outlier.image_id: names[outlier.image_id] for outlier in residuals.outliers},
         left_out=left_out,
         height_offsets_m=alignment.height_offsets,
+        flight=flight,
     )
 
 
 def write_sidecar(path: Path, sidecar: Sidecar) -> None:
     """Write the file, whole or not at all. Raises InputError if it cannot be written."""
+    write_json(path, as_row(sidecar))
+
+
+def as_row(sidecar: Sidecar) -> dict[str, Any]:
+    """What the file says, ready for JSON; read by ``of_row``."""
     origin, moved = sidecar.origin, sidecar.enu_from_built
-    write_json(
-        path,
-        {
-            "version": VERSION,
-            "state": sidecar.state.value,
-            "reasons": list(sidecar.reasons),
-            "crs": _CRS,
-            "origin": origin and asdict(origin),
-            "models_in_enu": list(sidecar.models_in_enu),
-            "enu_from_built": moved
-            and {
-                "scale": float(moved.scale),  # pycolmap hands out an array
-                "rotation_xyzw": moved.rotation.quat.tolist(),
-                "translation_m": moved.translation.tolist(),
-            },
-            "uncertainty": sidecar.uncertainty and asdict(sidecar.uncertainty),
-            "residuals": sidecar.residuals and _residual_rows(sidecar.residuals, sidecar.names),
-            "left_out": [
-                {"name": name, "reason": reason} for name, reason in sidecar.left_out.items()
-            ],
-            "height_offsets": [
-                {"flight": flight, "metres": metres}
-                for flight, metres in sidecar.height_offsets_m.items()
-            ],
-            "control_points": sidecar.control_points and sidecar.control_points.as_json(),
+    return {
+        "version": VERSION,
+        "state": sidecar.state.value,
+        "reasons": list(sidecar.reasons),
+        "crs": _CRS,
+        "origin": origin and asdict(origin),
+        "models_in_enu": list(sidecar.models_in_enu),
+        "enu_from_built": moved
+        and {
+            "scale": float(moved.scale),  # pycolmap hands out an array
+            "rotation_xyzw": moved.rotation.quat.tolist(),
+            "translation_m": moved.translation.tolist(),
         },
-    )
+        "uncertainty": sidecar.uncertainty and asdict(sidecar.uncertainty),
+        "residuals": sidecar.residuals and _residual_rows(sidecar.residuals, sidecar.names),
+        "left_out": [{"name": name, "reason": reason} for name, reason in sidecar.left_out.items()],
+        "height_offsets": [
+            {"flight": flight, "metres": metres}
+            for flight, metres in sidecar.height_offsets_m.items()
+        ],
+        "flight": sidecar.flight and asdict(sidecar.flight),
+        "control_points": sidecar.control_points and sidecar.control_points.as_json(),
+    }
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -152,7 +159,7 @@ def read_sidecar(path: Path) -> Sidecar:
             raise InputError(
                 f"{path}: version {row['version']}, this program reads {VERSION}. Update sfm-front."
             )
-        return _of_row(row)
+        return of_row(row)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(
@@ -162,9 +169,10 @@ def read_sidecar(path: Path) -> Sidecar:
         raise InputError(f"{path}: not a {FILE_NAME}. Reconstruct again to write it.") from error
 
 
-def _of_row(row: Mapping[str, Any]) -> Sidecar:
+def of_row(row: Mapping[str, Any]) -> Sidecar:
+    """Back from ``as_row``. Raises KeyError, TypeError or ValueError for anything else."""
     moved, residuals, uncertainty = row["enu_from_built"], row["residuals"], row["uncertainty"]
-    control = row.get("control_points")  # absent in files of earlier versions
+    control = row.get("control_points")
     return Sidecar(
         state=GeoreferenceState(row["state"]),
         reasons=tuple(row["reasons"]),
@@ -182,7 +190,9 @@ def _of_row(row: Mapping[str, Any]) -> Sidecar:
         names={one["image_id"]: one["name"] for one in residuals["outliers"]} if residuals else {},
         left_out={one["name"]: one["reason"] for one in row["left_out"]},
         height_offsets_m={one["flight"]: one["metres"] for one in row["height_offsets"]},
+        # Both are absent in files of earlier versions.
         control_points=None if control is None else ControlReport.of_json(control),
+        flight=row.get("flight") and FlightFigures(**row["flight"]),
     )
 
 

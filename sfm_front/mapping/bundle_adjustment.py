@@ -10,6 +10,9 @@ import pycolmap
 from sfm_front.errors import ConfigError
 from sfm_front.mapping.refinement_schedule import LARGE
 
+# In one model.
+_MOST_PHOTOS = 1_000_000
+
 
 @dataclass(frozen=True, kw_only=True)
 class RobustAdjustmentOptions:
@@ -52,8 +55,7 @@ def robust_adjustment(
     options: RobustAdjustmentOptions, num_photos: int
 ) -> pycolmap.BundleAdjustmentOptions:
     """pycolmap's options for a model of so many photos; the principal point stays."""
-    adjustment = pycolmap.BundleAdjustmentOptions()
-    adjustment.print_summary = False
+    adjustment = solved_directly(pycolmap.BundleAdjustmentOptions())
     adjustment.refine_focal_length = options.refine_intrinsics
     adjustment.refine_extra_params = options.refine_intrinsics
     adjustment.refine_principal_point = False
@@ -64,6 +66,17 @@ def robust_adjustment(
         options.large_tolerance if large else options.tolerance
     )
     adjustment.ceres.solver_options.num_threads = options.num_threads
+    return adjustment
+
+
+def solved_directly(
+    adjustment: pycolmap.BundleAdjustmentOptions,
+) -> pycolmap.BundleAdjustmentOptions:
+    """The options given, without what COLMAP does with more than a thousand photos: it solves by
+    conjugate gradients, which hardly move what has to be unbent. Photos that follow each other
+    make a matrix so sparse that it is factorized in no time (TUNING: direct-solver)."""
+    adjustment.ceres.max_num_images_direct_sparse_cpu_solver = _MOST_PHOTOS
+    adjustment.print_summary = False
     return adjustment
 
 

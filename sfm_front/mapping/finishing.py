@@ -50,6 +50,8 @@ class _Finishing:
                 model.take_two_view_tracks()
             self._atlas.refine_until_stable()
             self._register_loose()
+        for model in self._atlas.models:
+            model.leave_refinement()
         self._before_last()
         for model in self._atlas.models:
             model.finish()

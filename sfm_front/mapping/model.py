@@ -11,7 +11,11 @@ import pycolmap
 
 from sfm_front.events import Emit, ModelRefined
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
-from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, robust_adjustment
+from sfm_front.mapping.bundle_adjustment import (
+    RobustAdjustmentOptions,
+    robust_adjustment,
+    solved_directly,
+)
 from sfm_front.mapping.calibration import impossible_photos, is_miscalibrated
 from sfm_front.mapping.camera_motion import camera_centers, camera_motion
 from sfm_front.mapping.carry_over import Before, carry_over
@@ -61,6 +65,8 @@ class Model:
         # 0 until whoever starts it gives it another.
         self.model_id = 0
         self.is_georeferenced = False
+        # Whether the last adjustment kept to positions; None if it was not asked to.
+        self.is_held_to_positions: bool | None = None
         self._priors: PositionPriors | None = None
         self._view_graph = view_graph
         self._options = options
@@ -256,6 +262,10 @@ class Model:
         """Whether it is being refined in the background."""
         return self._under_way is not None
 
+    def leave_refinement(self) -> None:
+        """What is refined in the background is not waited for: all of it will be done at once."""
+        self._under_way = None
+
     def georeference(self, enu_from_world: pycolmap.Sim3d, priors: PositionPriors) -> None:
         """Move the world to the frame of these positions, to which it is held from now on.
 
@@ -285,10 +295,12 @@ class Model:
         self.reconstruction = final_adjustment(
             self.reconstruction, self._options.robust, self._options.calibration
         )
-        if self._priors is not None:
-            self.reconstruction = held_to_positions(
+        if self._priors is not None and self._priors.are_enough:
+            held = held_to_positions(
                 self.reconstruction, self._priors, self._options.robust, self._options.priors
             )
+            self.is_held_to_positions = held is not None
+            self.reconstruction = held or self.reconstruction
         if not self.is_miscalibrated:
             for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
@@ -388,7 +400,7 @@ class Model:
             pipeline.ba_global_max_refinements,
             pipeline.ba_global_max_refinement_change,
             self._mapping,
-            pipeline.get_global_bundle_adjustment(),
+            solved_directly(pipeline.get_global_bundle_adjustment()),
             self._triangulation,
             normalize_reconstruction=not self.is_georeferenced,
         )

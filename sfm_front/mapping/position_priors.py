@@ -48,20 +48,26 @@ class PositionPriors:
     positions: Mapping[int, Float64Array]
     sigmas: Mapping[int, Float64Array]
 
+    @property
+    def are_enough(self) -> bool:
+        """Whether a model can be held to them."""
+        return len(self.positions) >= _MIN_PRIORS
+
 
 def held_to_positions(
     reconstruction: pycolmap.Reconstruction,
     priors: PositionPriors,
     adjustment: RobustAdjustmentOptions,
     options: PriorOptions,
-) -> pycolmap.Reconstruction:
-    """A whole model, adjusted to photos and positions together; the one given if that fits worse.
+) -> pycolmap.Reconstruction | None:
+    """A copy of a whole model, adjusted to photos and positions together; None if that does not fit
+    the photos any more.
 
     ``reconstruction`` is in the frame of the positions and has been adjusted without them.
     """
     rows = _pose_priors(reconstruction, priors)
     if len(rows) < _MIN_PRIORS:
-        return reconstruction
+        return None
     held = copy.deepcopy(reconstruction)
     config = pycolmap.BundleAdjustmentConfig()
     for image_id in held.reg_image_ids():
@@ -76,7 +82,7 @@ def held_to_positions(
     ).solve()
     held.update_point_3d_errors()
     limit = (1 + options.max_error_rise) * median_error(reconstruction)
-    return held if median_error(held) <= limit else reconstruction
+    return held if median_error(held) <= limit else None
 
 
 def _pose_priors(

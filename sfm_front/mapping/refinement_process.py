@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import pycolmap
 
+from sfm_front.mapping.bundle_adjustment import solved_directly
+
 
 @dataclass(frozen=True, kw_only=True)
 class AdjustmentRequest:
@@ -33,8 +35,7 @@ class AdjustmentRequest:
 def adjust(request: AdjustmentRequest) -> None:
     """Read the model, adjust it, and write it back."""
     reconstruction = pycolmap.Reconstruction(request.model)
-    adjustment = pycolmap.BundleAdjustmentOptions()
-    adjustment.print_summary = False
+    adjustment = solved_directly(pycolmap.BundleAdjustmentOptions())
     adjustment.refine_focal_length = request.refine_intrinsics
     adjustment.refine_extra_params = request.refine_intrinsics
     solver = adjustment.ceres.solver_options

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sfm_front.errors import InputError
 from sfm_front.matching.nearest_neighbors import MatchingOptions, match_descriptors
 from sfm_front.matching.verification import Verifier
+from sfm_front.reports.position_explanation import position_in_words
 from sfm_front.reports.report_json import read_report
 from sfm_front.reports.retrieval_log import read_candidates
 from sfm_front.reports.run_summary import Outcome, RunSummary
@@ -44,7 +45,8 @@ class Explanation:
 
     ``skipped`` is the reason if the file was not used; ``model`` the folder of the largest model
     that holds the photo, with the number of its points that it sees; ``why_not`` what kept it out,
-    and ``hint`` what would help.
+    and ``hint`` what would help. ``position``: what became of where it was measured to be, empty if
+    nothing is known.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Explanation:
     num_points: int
     why_not: str
     hint: str
+    position: str = ""
 
     def __str__(self) -> str:
         if self.skipped:
@@ -68,6 +71,8 @@ class Explanation:
         lines = [f"{self.name}: {placed}"]
         if self.hint:
             lines.append(self.hint)
+        if self.position:
+            lines.append(self.position)
         lines.append(f"{self.num_keypoints} keypoints")
         if self.candidates:
             lines.append("candidates, as re-ranked (cosine, inliers of re-ranking, verdict):")
@@ -132,6 +137,7 @@ def explain(output: Path, name: str) -> Explanation:
         num_points=0 if model is None else _num_points(output / model, ids[name]),
         why_not=photo.why_not or "",
         hint=photo.hint,
+        position=position_in_words(output, summary, photo),
     )
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from sfm_front.errors import InputError
-from sfm_front.georeference.control.report import ControlReport
+from sfm_front.georeference.sidecar import as_row, of_row
 from sfm_front.reports.run_summary import (
     AuditOutcome,
+    GeoreferenceOutcome,
     Latency,
     ModelOutcome,
     Outcome,
@@ -45,7 +46,7 @@ def write_report(output: Path, summary: RunSummary) -> None:
         ],
         "end": {"seconds": _rounded(summary.end_seconds), "events": summary.end_events},
         "look_alikes": summary.look_alikes,
-        "control_points": summary.control_points and summary.control_points.as_json(),
+        "georeference": _georeference_row(summary.georeference),
         "totals": {
             "photos": totals.num_photos,
             "used": totals.num_used,
@@ -73,7 +74,7 @@ def read_report(output: Path) -> RunSummary:
     try:
         content = json.loads((output / FILE).read_text(encoding="utf-8"))
         return _summary(content)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
             f"{output}: no readable {FILE} in it. Give the output of a finished run."
         ) from error
@@ -110,6 +111,16 @@ def _latency_row(latency: Latency | None) -> dict[str, float] | None:
     if latency is None:
         return None
     return _rounded({"median": latency.median_s, "p95": latency.p95_s, "worst": latency.worst_s})
+
+
+def _georeference_row(outcome: GeoreferenceOutcome | None) -> dict[str, Any] | None:
+    if outcome is None:
+        return None
+    return {
+        "unused_rows": outcome.num_unused_rows,
+        "kept_positions": outcome.kept_positions,
+        "sidecar": outcome.sidecar and as_row(outcome.sidecar),
+    }
 
 
 def _audit_row(audit: AuditOutcome | None) -> dict[str, Any] | None:
@@ -164,12 +175,18 @@ def _summary(content: dict[str, Any]) -> RunSummary:
             tuple(tuple(group) for group in groups)
             for groups in content.get("look_alikes", ())  # absent in reports of earlier versions
         ),
-        control_points=_control_points(content.get("control_points")),  # as well
+        georeference=_georeference(content.get("georeference")),  # absent in earlier versions
     )
 
 
-def _control_points(row: dict[str, Any] | None) -> ControlReport | None:
-    return None if row is None else ControlReport.of_json(row)
+def _georeference(row: dict[str, Any] | None) -> GeoreferenceOutcome | None:
+    if row is None:
+        return None
+    return GeoreferenceOutcome(
+        sidecar=row["sidecar"] and of_row(row["sidecar"]),
+        num_unused_rows=row["unused_rows"],
+        kept_positions=row["kept_positions"],
+    )
 
 
 def _latency(row: dict[str, float] | None) -> Latency | None:

@@ -18,10 +18,10 @@ from sfm_front.events import (
     ModelRefined,
     PhotoAdded,
 )
-from sfm_front.georeference.control.report import ControlReport
 from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.run_summary import (
     AuditOutcome,
+    GeoreferenceOutcome,
     Latency,
     ModelOutcome,
     Outcome,
@@ -72,7 +72,7 @@ class RunReport:
         seconds: Mapping[str, float],
         events: Sequence[ModelEvent],
         latencies_s: Sequence[float],
-        control_points: ControlReport | None = None,
+        georeference: GeoreferenceOutcome | None = None,
     ) -> RunSummary:
         """Sum up.
 
@@ -102,7 +102,7 @@ class RunReport:
             end_events=_in_words(events),
             totals=self._totals(models, len(model_of), seconds, latencies_s),
             look_alikes=self._look_alikes(events),
-            control_points=control_points,
+            georeference=georeference,
         )
 
     def _look_alikes(self, events: Iterable[ModelEvent]) -> tuple[tuple[tuple[str, ...], ...], ...]:

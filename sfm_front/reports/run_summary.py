@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from sfm_front.georeference.control.report import ControlReport
+from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.types import Skipped
 
 
@@ -109,6 +110,21 @@ class Totals:
     latency: Latency | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GeoreferenceOutcome:
+    """What measured positions say of the models.
+
+    ``sidecar``: as ``georeference.json`` has it; None if no photo has a position and there are no
+    control points, or nobody wants to know. ``num_unused_rows`` of a file of positions name no
+    photo. ``kept_positions``: whether the last adjustment of the largest model used them; False if
+    they and the photos contradict each other, None if they were not tried.
+    """
+
+    sidecar: Sidecar | None
+    num_unused_rows: int = 0
+    kept_positions: bool | None = None
+
+
 Outcome: TypeAlias = Skipped | PhotoOutcome
 
 
@@ -117,8 +133,8 @@ class RunSummary:
     """Photos in order of arrival, models largest first, and how the session ended.
 
     ``end_events`` are those of idle times, too. ``look_alikes``: names of the photos of two groups
-    that show things that look alike, each time a model was taken apart for it.
-    ``control_points``: what became of them; None if none were given.
+    that show things that look alike, each time a model was taken apart for it. ``georeference``:
+    None where nothing is known of positions.
     """
 
     photos: tuple[Outcome, ...]
@@ -127,7 +143,13 @@ class RunSummary:
     end_events: tuple[str, ...]
     totals: Totals
     look_alikes: tuple[tuple[tuple[str, ...], ...], ...] = ()
-    control_points: ControlReport | None = None
+    georeference: GeoreferenceOutcome | None = None
+
+    @property
+    def control_points(self) -> ControlReport | None:
+        """What became of them; None if none were given."""
+        sidecar = self.georeference and self.georeference.sidecar
+        return sidecar.control_points if sidecar else None
 
     @property
     def used(self) -> list[PhotoOutcome]:

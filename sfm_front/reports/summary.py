@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sfm_front.reports.control_words import control_lines
+from sfm_front.reports.georeference_words import georeference_lines
 from sfm_front.reports.run_summary import AuditOutcome, RunSummary
 
 # Photos of a doubtful group; report.json names all.
@@ -30,6 +31,8 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
         )
         if model.audit and model.audit.is_doubtful:
             lines.append(f"    {_doubt(model.audit)}")
+    if summary.georeference is not None:
+        lines += georeference_lines(summary.georeference)
     if summary.control_points is not None:
         lines += control_lines(summary.control_points)
     photos = max(totals.num_photos, 1)

@@ -90,7 +90,7 @@ class ControlPoints:
                 why_not = why_not or result.reason  # that of the largest
                 continue
             reason = f"held to {result.control.count} control points"
-            georeferencing.held_to_control(models, number, frame, result.enu_from_model, reason)
+            georeferencing.held_to_control(model, frame, result.enu_from_model, reason)
             told = result.checkpoints if result.checkpoints.count else result.control
             self._emit(
                 HeldToControlPoints(

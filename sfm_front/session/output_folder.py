@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sfm_front.errors import InputError
 from sfm_front.exporters.colmap import STATE
-from sfm_front.georeference.sidecar import FILE_NAME
+from sfm_front.georeference.sidecar import FILE_NAME as SIDECAR
 from sfm_front.reports import event_log, report_json, retrieval_log
 from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.database import DATABASE
@@ -25,7 +25,6 @@ _FILES = (
     _MARKER,
 )
 _MODELS = ("sparse", "sparse.new", "sparse.old")
-_BESIDE_MODELS = (STATE, FILE_NAME)
 _MODEL_NAME = re.compile(r"\d+")
 _MODEL_FILES = frozenset(
     {
@@ -141,8 +140,10 @@ def _foreign(output: Path) -> Iterator[Path]:
             yield folder
             continue
         for model in folder.iterdir():
-            is_beside = any(model.name == f or is_partial(model.name, f) for f in _BESIDE_MODELS)
-            if is_beside and _is_own_file(model):
+            is_ours = any(
+                model.name == name or is_partial(model.name, name) for name in (STATE, SIDECAR)
+            )
+            if is_ours and _is_own_file(model):
                 continue
             if model.is_symlink() or not model.is_dir() or not _MODEL_NAME.fullmatch(model.name):
                 yield model

@@ -20,6 +20,8 @@ from sfm_front.events import (
     SessionStarted,
 )
 from sfm_front.features.global_descriptors.descriptor import resolve
+from sfm_front.georeference.georeferencer import Georeference
+from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.unfolding import unfold
@@ -146,6 +148,12 @@ class Session(Closeable):
         """What is known of all photos."""
         return self._parts.database
 
+    @property
+    def georeference(self) -> Georeference:
+        """Where the largest model stands on the earth, as far as positions told when it was looked
+        at last."""
+        return self._parts.georeferencing.georeference
+
     def _go_on(self, opened: ExitStack) -> None:
         """Where an earlier run of this session stopped, if there was one."""
         known = check_options(self.database, self.options, self.output)
@@ -252,7 +260,10 @@ class Session(Closeable):
             ]
         with clock.stage("export"):
             self.database.write_priors(self._parts.positions.checked().usable)
-            models = self._write_snapshot(final=True)
+            positions = self._parts.georeferencing.outcome(
+                self._parts.atlas.models, self._parts.control_points.report
+            )
+            models = self._export(positions.sidecar if positions else None, final=True)
         waiting = self._parts.atlas.waiting
         summary = self._parts.report.finish(
             models,
@@ -262,7 +273,7 @@ class Session(Closeable):
             seconds=clock.seconds,
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
-            control_points=self._parts.control_points.report,
+            georeference=positions,
         )
         write_report(self.output, summary)
         mark_finished(self.database)
@@ -304,17 +315,19 @@ class Session(Closeable):
             self._announcer.tell_placed(atlas, image_id)
         return result
 
-    def _write_snapshot(self, *, final: bool = False) -> list[ModelSummary]:
-        catalog, text = self._parts.catalog, final and self.options.text
-        models, georeferencing = self._parts.atlas.models, self._parts.georeferencing
+    def _write_snapshot(self) -> None:
+        self._export(self._parts.georeferencing.sidecar(self._parts.atlas.models))
+
+    def _export(self, sidecar: Sidecar | None, *, final: bool = False) -> list[ModelSummary]:
+        catalog = self._parts.catalog
         return self._snapshots.write(
-            models,
+            self._parts.atlas.models,
             len(catalog),
             catalog.colors,
-            georeferencing.as_json(),
-            georeferencing.sidecar(models, self._parts.control_points.report),
+            self._parts.georeferencing.as_json(),
+            sidecar,
             final=final,
-            text=text,
+            text=final and self.options.text,
         )
 
     def _add(self, photo: ExtractedPhoto) -> PhotoAdded | Skipped:

@@ -70,6 +70,8 @@ def test_a_bend_needs_heights_and_an_extent():
     assert bend_of_heights(enu[:9], np.ones(9)) is None
     assert bend_of_heights(np.zeros((20, 3)), np.ones(20)) is None
     assert bend_of_heights(enu, np.where(np.arange(100) < 9, 1.0, np.nan)) is None
+    # Far larger than the extent: its scale is not known.
+    assert bend_of_heights(1e-3 * enu, ((enu[:, 0] - 50) / 50) ** 2) is None
 
 
 def test_a_bend_along_one_line_is_found():

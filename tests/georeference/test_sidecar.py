@@ -16,6 +16,7 @@ from sfm_front.geometry.enu import LocalFrame
 from sfm_front.georeference import sidecar as sidecar_module
 from sfm_front.georeference.alignment import align
 from sfm_front.georeference.control.report import ControlReport
+from sfm_front.georeference.flight_figures import FlightFigures
 from sfm_front.georeference.georeferencer import Georeference
 from sfm_front.georeference.sidecar import (
     FILE_NAME,
@@ -39,15 +40,19 @@ def full() -> Sidecar:
     alignment = align(photos.centres, photos.fixes(flights=labels), photos.cam_from_model)
     ids = range(1, 41)
     georeference = Georeference(
-        state=GeoreferenceState.METRIC, frame=FRAME, alignment=alignment, image_ids=tuple(ids)
+        state=GeoreferenceState.METRIC,
+        frame=FRAME,
+        alignment=alignment,
+        image_ids=tuple(ids),
+        cam_from_model=tuple(photos.poses()),
     )
     return sidecar_of(
         georeference,
-        dict(zip(ids, photos.poses(), strict=True)),
         {image_id: f"{image_id}.jpg" for image_id in ids},
         {"ä.jpg": "altitude 0 where others have one"},
         enu_from_built=BUILT,
         models_in_enu=(0,),
+        flight=FlightFigures(2.1, 55.0, 12_100.0),
     )
 
 
@@ -80,7 +85,6 @@ def test_the_file_says_what_a_surveyor_asks(full, tmp_path):
 def test_no_georeference_is_said_too(tmp_path):
     nothing = sidecar_of(
         Georeference(reasons=("no photo has a position",)),
-        {},
         {},
         {},
         enu_from_built=None,

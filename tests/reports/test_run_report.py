@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from helpers.georeference_making import FLIGHT
 from helpers.model_building import looking, make_model
 
 from sfm_front.errors import InputError
@@ -20,7 +23,7 @@ from sfm_front.events import (
 from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.report_json import read_report, write_report
 from sfm_front.reports.run_report import RunReport
-from sfm_front.reports.run_summary import Latency, RunSummary
+from sfm_front.reports.run_summary import GeoreferenceOutcome, Latency, RunSummary
 from sfm_front.types import (
     CandidateOutcome,
     ModelSummary,
@@ -209,6 +212,23 @@ def test_a_report_of_an_earlier_version_has_no_audits(content, tmp_path):
         del model["audit"]
     (tmp_path / "report.json").write_text(json.dumps(content), encoding="utf-8")
     assert [model.audit for model in read_report(tmp_path).models] == [None, None]
+
+
+def test_what_positions_say_is_read_back_and_earlier_versions_have_nothing(run, tmp_path):
+    told = replace(run, georeference=FLIGHT)
+    write_report(tmp_path, told)
+    read = read_report(tmp_path).georeference
+    built = [one.sidecar.enu_from_built.matrix() for one in (read, FLIGHT)]
+    np.testing.assert_allclose(*built)
+    same = FLIGHT.sidecar.enu_from_built
+    assert replace(read, sidecar=replace(read.sidecar, enu_from_built=same)) == FLIGHT
+    nothing = GeoreferenceOutcome(sidecar=None, num_unused_rows=3)
+    write_report(tmp_path, replace(run, georeference=nothing))
+    assert read_report(tmp_path).georeference == nothing
+    content = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    del content["georeference"]
+    (tmp_path / "report.json").write_text(json.dumps(content), encoding="utf-8")
+    assert read_report(tmp_path).georeference is None
 
 
 @pytest.mark.parametrize("text", [None, "", "[]", '{"photos": 3}', '{"photos": [{}]}'])

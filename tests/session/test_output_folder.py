@@ -26,7 +26,7 @@ def finished(folder: Path) -> Path:
     for name in ("cameras.bin", "images.bin", "points3D.bin", "points3D.ply"):
         (model / name).write_bytes(b"model")
     for name in ("session.json", "georeference.json"):
-        (folder / "sparse" / name).write_bytes(b"beside")
+        (folder / "sparse" / name).write_bytes(b"of the models")
     for name in ("database.db", "retrieval.jsonl", "report.json"):
         (folder / name).write_bytes(b"output")
     return folder
