@@ -6,11 +6,13 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from sfm_front.georeference.control.report import ControlReport
-from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.types import Skipped
+
+if TYPE_CHECKING:  # The command line reads this before anything heavy may be loaded.
+    from sfm_front.georeference.control.report import ControlReport
+    from sfm_front.georeference.sidecar import Sidecar
 
 
 @dataclass(frozen=True, slots=True)

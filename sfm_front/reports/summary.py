@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sfm_front.reports.control_words import control_lines
-from sfm_front.reports.georeference_words import georeference_lines
 from sfm_front.reports.run_summary import AuditOutcome, RunSummary
 
 # Photos of a doubtful group; report.json names all.
@@ -19,6 +18,9 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
 
     ``watched``: photos arrived one by one, so that their latency means something to the user.
     """
+    # Here, for it loads pycolmap, and the command line reads this file before it may be loaded.
+    from sfm_front.reports.georeference_words import georeference_lines
+
     totals = summary.totals
     lines = [
         f"{totals.num_registered} of {totals.num_photos} photos registered in "
