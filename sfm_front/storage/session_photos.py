@@ -20,8 +20,7 @@ def read_photos(database: Path) -> list[StoredPhoto] | None:
     None if there is no such file, or it cannot be read, or is no session's: COLMAP's own databases
     have the same name, and opening one as ``PhotoDatabase`` would add our tables to it.
     """
-    for access in _ACCESS:
-        address = f"{database.absolute().as_uri()}?{access}"
+    for address in addresses(database):
         try:
             with closing(sqlite3.connect(address, uri=True)) as connection:
                 rows = connection.execute(f"SELECT {PHOTO_COLUMNS} ORDER BY image_id")
@@ -29,3 +28,8 @@ def read_photos(database: Path) -> list[StoredPhoto] | None:
         except sqlite3.Error:
             continue
     return None
+
+
+def addresses(database: Path) -> list[str]:
+    """How to open the file for reading, for SQLite; the second where the first fails."""
+    return [f"{database.absolute().as_uri()}?{access}" for access in _ACCESS]

@@ -40,16 +40,20 @@ def choose_view(
     world_from_cam: Float64Array,
     centres: Float64Array,
     aspect: float,
+    *,
+    azimuth_deg: float = _AZIMUTH_DEG,
+    elevation_deg: float = _ELEVATION_DEG,
 ) -> View:
     """A view of the whole scene with its cameras.
 
     ``points`` (N, 3) are the model's; ``camera_points`` (M, 3) are the corners of the drawn frusta,
     all of which stay inside; ``world_from_cam`` (K, 3, 3) are rotations in COLMAP's convention
     (x right, y down, z forward) and ``centres`` (K, 3) the projection centres, K at least 1;
-    ``aspect`` is width over height.
+    ``aspect`` is width over height. ``elevation_deg`` above the horizon, below 90;
+    ``azimuth_deg``: to the right of the cameras' heading, which the view has at 0.
     """
     up = upward(world_from_cam, centres)
-    towards = _viewing_direction(world_from_cam, up)
+    towards = _viewing_direction(world_from_cam, up, azimuth_deg, elevation_deg)
     right = _unit(np.cross(towards, up))
     view_up = np.cross(right, towards)
     basis = np.stack([right, view_up, -towards])  # world to (right, up, towards the viewer)
@@ -86,8 +90,10 @@ def upward(world_from_cam: Float64Array, centres: Float64Array) -> Float64Array:
     return _unit(next(choice for choice in choices if np.linalg.norm(choice) > _AGREEMENT))
 
 
-def _viewing_direction(world_from_cam: Float64Array, up: Float64Array) -> Float64Array:
-    """From ``_ELEVATION_DEG`` above the horizon, ``_AZIMUTH_DEG`` off the cameras' heading.
+def _viewing_direction(
+    world_from_cam: Float64Array, up: Float64Array, azimuth_deg: float, elevation_deg: float
+) -> Float64Array:
+    """From ``elevation_deg`` above the horizon, ``azimuth_deg`` off the cameras' heading.
 
     The heading is their mean viewing direction. Cameras that look straight down or circle an
     object have none: then it is where the tops of their pictures point, or the first camera's.
@@ -96,7 +102,7 @@ def _viewing_direction(world_from_cam: Float64Array, up: Float64Array) -> Float6
     choices = [forwards.mean(axis=0), tops.mean(axis=0), forwards[0], tops[0]]
     levelled = [choice - (choice @ up) * up for choice in choices]
     heading = next(flat for flat in levelled if np.linalg.norm(flat) > _AGREEMENT)
-    azimuth, elevation = np.radians([_AZIMUTH_DEG, _ELEVATION_DEG])
+    azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
     turned = np.cos(azimuth) * _unit(heading) + np.sin(azimuth) * _unit(np.cross(heading, up))
     direction: Float64Array = np.cos(elevation) * turned - np.sin(elevation) * up
     return direction
