@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Sequence
 
 from sfm_front import __version__
-from sfm_front.cli import explain, export, reconstruct, retrieve, view
+from sfm_front.cli import explain, export, reconstruct, report, retrieve, view
 from sfm_front.cli.logs import add_logging, logging_to
 from sfm_front.cli.signals import INTERRUPTED
 from sfm_front.cli.streams import unfailing_streams
@@ -39,6 +39,7 @@ def _parser() -> argparse.ArgumentParser:
     _add(commands, "retrieve", "folder and photo → its most relevant photos", retrieve)
     _add(commands, "view", "look at a sparse model", view)
     _add(commands, "export", "hand a model on to another tool", export)
+    _add(commands, "report", "the page of a reconstruction, made anew", report)
     _add(commands, "explain", "why a photo was placed, or was not", explain)
     return parser
 

@@ -187,6 +187,7 @@ def run(arguments: argparse.Namespace) -> int:
     # Once more: pycolmap has put a handler of its own for SIGTERM in place.
     with leaving_at_signal(1):
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
+        from sfm_front.reports.html.page import write_page
         from sfm_front.session.output_folder import holds_session
         from sfm_front.session.resume import Newcomers, nothing_to_do
         from sfm_front.session.session import Session
@@ -238,6 +239,7 @@ def run(arguments: argparse.Namespace) -> int:
         result = session.finish()
         progress.end()
         progress.note(closing_summary(result.summary, output, watched=arguments.watch))
+        progress.note(f"to look at: {write_page(output)}")
     return 0 if result.models else 1
 
 

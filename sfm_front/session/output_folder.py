@@ -10,7 +10,7 @@ from pathlib import Path
 from sfm_front.errors import InputError
 from sfm_front.exporters.colmap import STATE
 from sfm_front.georeference.sidecar import FILE_NAME as SIDECAR
-from sfm_front.reports import event_log, report_json, retrieval_log
+from sfm_front.reports import event_log, html, report_json, retrieval_log
 from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.database import DATABASE
 from sfm_front.storage.session_lock import SessionLock
@@ -22,6 +22,7 @@ _FILES = (
     f"{DATABASE}-wal",
     event_log.FILE,
     report_json.FILE,
+    html.FILE,
     _MARKER,
 )
 _MODELS = ("sparse", "sparse.new", "sparse.old")

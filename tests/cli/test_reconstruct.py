@@ -117,6 +117,14 @@ def test_each_bad_file_is_named_with_its_reason(run, name):
     assert [line for line in lines if line.startswith(f"  {name}: {BAD[name]}")]
 
 
+def test_a_page_is_written_last(run):
+    page = run.output / "report.html"
+    assert run.stdout.splitlines()[-1] == f"to look at: {page}"
+    text = page.read_text(encoding="utf-8")
+    assert f"All {len(run.names)} photos are in one model" in text
+    assert all(name in text for name in (*run.names, *BAD))
+
+
 def test_every_good_photo_is_registered(run):
     (model,) = run.report["models"]
     assert model["registered"] == len(run.names)

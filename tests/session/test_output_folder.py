@@ -27,7 +27,7 @@ def finished(folder: Path) -> Path:
         (model / name).write_bytes(b"model")
     for name in ("session.json", "georeference.json"):
         (folder / "sparse" / name).write_bytes(b"of the models")
-    for name in ("database.db", "retrieval.jsonl", "report.json"):
+    for name in ("database.db", "retrieval.jsonl", "report.json", "report.html"):
         (folder / name).write_bytes(b"output")
     return folder
 

@@ -1,0 +1,26 @@
+"""Make the page of a reconstruction anew: verdict, pictures, plan, accuracy, reasons, times."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``report`` on ``parser``."""
+    parser.add_argument("output", type=Path, help="output of a finished reconstruction")
+    parser.add_argument(
+        "--photos",
+        type=Path,
+        metavar="FOLDER",
+        help="where the photos are, if they are no longer where they were",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write ``report.html`` into the output; 0 if it was written."""
+    from sfm_front.reports.html.page import write_page
+
+    file = write_page(arguments.output, arguments.photos)
+    print(f"wrote {file}: open it in a browser")
+    return 0
