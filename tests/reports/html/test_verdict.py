@@ -9,6 +9,8 @@ import pycolmap
 import pytest
 from helpers.report_making import METRIC, Output, summary_of
 
+from sfm_front.georeference.control.report import ControlReport
+from sfm_front.georeference.control.residuals import ControlAccuracy
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.reports.html.cameras import CameraResult, median_change
 from sfm_front.reports.html.material import Material
@@ -90,6 +92,22 @@ def test_fit_to_positions():
     assert (found.level, found.words) == (Level.FAIR, "model and positions differ")
     none = replace(METRIC, state=GeoreferenceState.NONE, residuals=None, reasons=("2 positions",))
     assert light("Fit to GPS", material_of(sidecar=none)).level is Level.BAD
+
+
+def test_fit_to_control_points():
+    held = ControlAccuracy(5, 0.01, 0.01, 0.02, 0.03, 0.04)
+    checked = ControlAccuracy(2, 0.1, 0.1, 0.2, 0.3, 0.4)
+    report = ControlReport(file="gcp_list.txt", model=0, control=held, checkpoints=checked)
+
+    def found(report):
+        return light("Control points", material_of(sidecar=replace(METRIC, control_points=report)))
+
+    assert found(report).level is Level.GOOD
+    assert (found(report).value, "2 checkpoints" in found(report).words) == ("0.300 m", True)
+    unchecked = replace(report, checkpoints=replace(checked, count=0))
+    assert (found(unchecked).value, "5 control" in found(unchecked).words) == ("0.030 m", True)
+    assert found(replace(report, sigma_factor=3.0)).level is Level.FAIR
+    assert found(ControlReport(file="f", not_used="line 7")).level is Level.BAD
 
 
 def test_doubtful_models_are_bad():
