@@ -28,16 +28,13 @@ def accuracy(material: Material) -> Html | None:
         return None
     residuals = sidecar.residuals
     reasons = [tag("li", reason) for reason in sidecar.reasons]
+    tables = joined([_by_axis(residuals), _outliers(sidecar, residuals), _left_out(sidecar)])
+    facts = _definitions([*_flight(material.flight), *_facts(sidecar, residuals)])
     return joined(
         [
             tag("p", _STATES[sidecar.state] if material.frame is None else _IN_ENU),
             tag("ul", joined(reasons)) if reasons else None,
-            tag(
-                "div",
-                tag("div", _by_axis(residuals), _outliers(sidecar, residuals), _left_out(sidecar)),
-                _definitions([*_flight(material.flight), *_facts(sidecar, residuals)]),
-                class_="columns",
-            ),
+            tag("div", tag("div", tables) if tables else None, facts, class_="columns"),
             control_points(sidecar.control_points),
         ]
     )

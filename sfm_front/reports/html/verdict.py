@@ -52,13 +52,13 @@ def sentence(material: Material) -> str:
     total = summary.totals.num_registered
     what = "All" if largest == used else f"{largest} of"
     parts = [f"{what} {counted(used, 'photo')} {'is' if used == 1 else 'are'} in one model"]
-    if rest:
-        parts[0] += f", {total - largest} more in {counted(rest, 'other')}"
     if material.frame is not None:
         parts[0] += ", in metres"
     doubtful = sum(bool(m.audit and m.audit.is_doubtful) for m in summary.models)
     if doubtful:
         parts[0] += ", but some of their matches contradict it"
+    if rest:
+        parts.append(f"{total - largest} more in {counted(rest, 'other')}")
     missing = Counter(photo.why_not or "" for photo in summary.used if photo.model is None)
     if missing:
         why, _ = missing.most_common(1)[0]

@@ -141,4 +141,4 @@ def test_several_models_are_said():
     models = [replace(material.summary.models[0], num_registered=n) for n in (6, 3)]
     summary = replace(material.summary, models=tuple(models))
     said = sentence(replace(material, summary=summary))
-    assert said == "6 of 9 photos are in one model, 3 more in 1 other."
+    assert said == "6 of 9 photos are in one model; 3 more in 1 other."
