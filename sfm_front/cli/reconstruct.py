@@ -112,7 +112,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera-mode",
         help="which photos share one: auto (default), single, per-folder or per-image",
     )
-    cameras.add_argument("--camera-model", help="any of COLMAP's (default: SIMPLE_RADIAL)")
+    cameras.add_argument(
+        "--camera-model",
+        help="any of COLMAP's, which stays; or auto (default): SIMPLE_RADIAL, which becomes RADIAL "
+        "or OPENCV at the end where the photos bear it out",
+    )
     cameras.add_argument(
         "--camera-params", metavar="F,CX,CY,…", help="known calibration, in COLMAP's order"
     )

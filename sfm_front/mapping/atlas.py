@@ -19,6 +19,7 @@ from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.initialization import InitializationOptions, Initializer
 from sfm_front.mapping.joining import Joiner, JoiningOptions
+from sfm_front.mapping.lens_growth import simplify_lenses
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
 from sfm_front.mapping.lookalikes import FoldOptions
 from sfm_front.mapping.mapper_options import MapperOptions
@@ -102,6 +103,7 @@ class Atlas:
     def restore(self, models: Iterable[tuple[pycolmap.Reconstruction, ModelState]]) -> None:
         """Go on from models of an earlier run, all of whose photos are in the view graph."""
         for reconstruction, state in models:
+            simplify_lenses(reconstruction, self.view_graph.cameras, self.options.mapper.robust)
             self.models.append(
                 Model.restored(
                     self.view_graph,

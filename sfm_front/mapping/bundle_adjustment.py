@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import pycolmap
@@ -94,10 +95,22 @@ def adjust_all(
     pycolmap.create_default_bundle_adjuster(adjustment, config, reconstruction).solve()
 
 
-def median_error(reconstruction: pycolmap.Reconstruction) -> float:
+def median_error(
+    reconstruction: pycolmap.Reconstruction, camera_ids: Collection[int] | None = None
+) -> float:
     """Of the mean reprojection errors of its points, in pixels; 0 where there is no point.
 
-    Wrong matches move a mean.
+    ``camera_ids``: only points that photos of these cameras see. Wrong matches move a mean.
     """
-    errors = [float(point.error) for point in reconstruction.points3D.values()]
+    points = list(reconstruction.points3D.values())
+    if camera_ids is not None:
+        photos = {
+            i
+            for i in reconstruction.reg_image_ids()
+            if reconstruction.image(i).camera_id in camera_ids
+        }
+        points = [
+            point for point in points if any(e.image_id in photos for e in point.track.elements)
+        ]
+    errors = [float(point.error) for point in points]
     return statistics.median(errors) if errors else 0.0

@@ -1,39 +1,49 @@
-"""Whether photos determine their cameras, and the principal point of a camera nobody knows."""
+"""When a camera's photos determine it, and what its last refinement must bring."""
 
 from __future__ import annotations
 
-import copy
-import math
 from dataclasses import dataclass
 
 import pycolmap
 
 from sfm_front.errors import ConfigError
-from sfm_front.mapping.bundle_adjustment import (
-    RobustAdjustmentOptions,
-    adjust_robustly,
-    median_error,
-)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationOptions:
-    """When a principal point that was refined is kept."""
+    """When a richer lens, or a principal point that was refined, is kept."""
 
+    # Whether SIMPLE_RADIAL may become RADIAL, and RADIAL OPENCV.
+    grow_lens: bool = True
     # Photos that must share the camera.
     min_photos: int = 8
-    # Share of the median reprojection error that must go (TUNING: principal-point-gain).
-    min_gain: float = 0.035
+    # Share of the median reprojection error that each step must take away (TUNING: lens-gain).
+    min_gain: float = 0.01
+    # Share of that which the residuals must promise for a lens to be tried (TUNING: lens-promise).
+    promising: float = 0.8
     # Of the long side; a model that wants its principal point farther out is not determined.
     max_shift: float = 0.025
+    # Standard deviation of the focal length as a share of it, up to which photos determine their
+    # camera (TUNING: focal-sigma).
+    max_focal_sigma: float = 0.003
 
     def __post_init__(self) -> None:
         if self.min_photos < 1:
             raise ConfigError(f"min_photos must be at least 1, got {self.min_photos}")
-        for name in ("min_gain", "max_shift"):
+        for name in ("min_gain", "max_shift", "max_focal_sigma"):
             value = getattr(self, name)
             if not 0 <= value < 1:
                 raise ConfigError(f"{name} must be from 0 to below 1, got {value}")
+        if not 0 <= self.promising <= 1:
+            raise ConfigError(f"promising must be from 0 to 1, got {self.promising}")
+
+
+def photos_by_camera(reconstruction: pycolmap.Reconstruction) -> dict[int, list[int]]:
+    """Camera id → image ids of its registered photos, both sorted."""
+    photos: dict[int, list[int]] = {}
+    for image_id in sorted(reconstruction.reg_image_ids()):
+        photos.setdefault(int(reconstruction.image(image_id).camera_id), []).append(image_id)
+    return dict(sorted(photos.items()))
 
 
 def impossible_photos(
@@ -54,44 +64,3 @@ def is_miscalibrated(
 ) -> bool:
     """Whether most photos have a camera that cannot be: they do not tell what it is."""
     return 2 * len(impossible_photos(reconstruction, limits)) > reconstruction.num_reg_images()
-
-
-def with_principal_point(
-    reconstruction: pycolmap.Reconstruction,
-    options: CalibrationOptions,
-    adjustment: RobustAdjustmentOptions,
-) -> pycolmap.Reconstruction:
-    """The model adjusted with its principal point where that is better, or the one given."""
-    camera_id = _only_camera_id(reconstruction)
-    if (
-        camera_id is None
-        or not adjustment.refine_intrinsics
-        or reconstruction.num_reg_images() < options.min_photos
-        or reconstruction.camera(camera_id).has_prior_focal_length
-    ):
-        return reconstruction
-    moved = copy.deepcopy(reconstruction)
-    adjust_robustly(moved, adjustment, principal_point=True)
-    return moved if _is_better(moved, reconstruction, camera_id, options) else reconstruction
-
-
-def _only_camera_id(reconstruction: pycolmap.Reconstruction) -> int | None:
-    """The camera of all registered photos; None where there are several."""
-    used = {int(reconstruction.image(i).camera_id) for i in reconstruction.reg_image_ids()}
-    return used.pop() if len(used) == 1 else None
-
-
-def _is_better(
-    moved: pycolmap.Reconstruction,
-    fixed: pycolmap.Reconstruction,
-    camera_id: int,
-    options: CalibrationOptions,
-) -> bool:
-    if median_error(moved) > (1 - options.min_gain) * median_error(fixed):
-        return False
-    camera = moved.camera(camera_id)
-    shift_px = math.dist(
-        (camera.principal_point_x, camera.principal_point_y),
-        (camera.width / 2, camera.height / 2),
-    )
-    return shift_px <= options.max_shift * max(camera.width, camera.height)

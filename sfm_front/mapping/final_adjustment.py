@@ -5,29 +5,27 @@ from __future__ import annotations
 import pycolmap
 
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, adjust_robustly
-from sfm_front.mapping.calibration import CalibrationOptions, with_principal_point
+from sfm_front.mapping.calibration import CalibrationOptions
+from sfm_front.mapping.lens_growth import GrownModel, with_grown_lenses
 
 
 def final_adjustment(
     reconstruction: pycolmap.Reconstruction,
     options: RobustAdjustmentOptions,
     calibration: CalibrationOptions | None = None,
-) -> pycolmap.Reconstruction:
+) -> GrownModel:
     """The model after a bundle adjustment with a robust loss; the one given is changed as well.
 
     COLMAP ends with plain least squares, which wrong matches dominate (TUNING: robust-loss).
 
-    Photos without EXIF have often been cropped. If all share one camera without a focal length
-    prior, its principal point is refined too, and kept only if the error falls enough and the point
-    stays near the centre. The error is the median: wrong matches, which no principal point
-    explains, move the mean.
-
-    Finally points that do not fit are dropped: the robust loss leaves them unconstrained.
+    While it grew, its cameras had simple lenses, with the principal point in the middle: richer
+    ones, before there are photos enough, diverge. Now they get what the photos bear out. Finally
+    points that do not fit are dropped: the robust loss leaves them unconstrained.
     """
     adjust_robustly(reconstruction, options, principal_point=False)
-    polished = with_principal_point(reconstruction, calibration or CalibrationOptions(), options)
-    drop_misfits(polished)
-    return polished
+    grown = with_grown_lenses(reconstruction, calibration or CalibrationOptions(), options)
+    drop_misfits(grown.reconstruction)
+    return grown
 
 
 def drop_misfits(reconstruction: pycolmap.Reconstruction) -> None:

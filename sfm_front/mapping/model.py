@@ -65,9 +65,12 @@ class Model:
         # 0 until whoever starts it gives it another.
         self.model_id = 0
         self.is_georeferenced = False
+        # Once it is finished, see ``GrownModel``.
+        self.focal_sigmas: Mapping[int, float] = {}
         # Whether the last adjustment kept to positions; None if it was not asked to.
         self.is_held_to_positions: bool | None = None
         self._priors: PositionPriors | None = None
+        self._finished: pycolmap.ObservationManager | None = None
         self._view_graph = view_graph
         self._options = options
         self.emit = emit
@@ -141,7 +144,8 @@ class Model:
 
     def num_visible_points(self, image_id: int) -> int:
         """Points of the model that a photo's verified matches lead to."""
-        return int(self._mapper.observation_manager.num_visible_points3D(image_id))
+        observations = self._finished or self._mapper.observation_manager
+        return int(observations.num_visible_points3D(image_id))
 
     def extend(self, image_id: int) -> None:
         """Make a photo just added to the view graph known to the model."""
@@ -292,9 +296,11 @@ class Model:
         self._mapper.adjust_global_bundle(
             self._mapping, robust_adjustment(self._options.robust, self.num_registered)
         )
-        self.reconstruction = final_adjustment(
+        polished = final_adjustment(
             self.reconstruction, self._options.robust, self._options.calibration
         )
+        self.reconstruction = polished.reconstruction
+        self.focal_sigmas = polished.focal_sigmas
         if self._priors is not None and self._priors.are_enough:
             held = held_to_positions(
                 self.reconstruction, self._priors, self._options.robust, self._options.priors
@@ -304,8 +310,13 @@ class Model:
         if not self.is_miscalibrated:
             for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
-        # What is asked of the mapper from here on must be of the model that is handed out.
-        self._begin_anew()
+        self._mapper.end_reconstruction(False)
+        self._end_as(self.reconstruction)
+
+    def _end_as(self, reconstruction: pycolmap.Reconstruction) -> None:
+        """What is asked from here on must be of the model that is handed out."""
+        self.reconstruction = reconstruction
+        self._finished = self._view_graph.observations_of(reconstruction)
 
     @property
     def robust(self) -> RobustAdjustmentOptions:
@@ -313,10 +324,10 @@ class Model:
         return self._options.robust
 
     def adopt(self, adjusted: pycolmap.Reconstruction) -> None:
-        """Become this adjusted copy of it, without the points that do not fit any more."""
+        """Become this adjusted copy of it, without the points that do not fit any more; once it is
+        finished."""
         drop_misfits(adjusted)
-        self.reconstruction = adjusted
-        self._begin_anew()
+        self._end_as(adjusted)
 
     @property
     def is_miscalibrated(self) -> bool:

@@ -79,6 +79,11 @@ class ViewGraph:
         """In order of arrival."""
         return list(self._neighbors)
 
+    @property
+    def cameras(self) -> dict[int, pycolmap.Camera]:
+        """As photos were added with them, by camera id."""
+        return dict(self._cache.cameras)
+
     def name(self, image_id: int) -> str:
         """What a photo is called."""
         return str(self._cache.image(image_id).name)
@@ -175,6 +180,12 @@ class ViewGraph:
         mapper = pycolmap.IncrementalMapper(self._cache)
         mapper.begin_reconstruction(reconstruction)
         return mapper, reconstruction
+
+    def observations_of(
+        self, reconstruction: pycolmap.Reconstruction
+    ) -> pycolmap.ObservationManager:
+        """What photos see of a model that no mapper can go on with: its lenses may be others."""
+        return pycolmap.ObservationManager(reconstruction, self._cache.correspondence_graph)
 
     def extend(
         self,

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 CameraMode = Literal["auto", "single", "per-folder", "per-image"]
 AnyPhoto: TypeAlias = "Photo | ExtractedPhoto | StoredPhoto"
 
+AUTO = "auto"
+"""Cameras start as ``SIMPLE_RADIAL``, and get a richer lens at the end where it is borne out."""
+
 DEFAULT_FOCAL_FACTOR = 1.2
 """Focal length over the long side if EXIF gives none, as in COLMAP."""
 
@@ -33,8 +36,9 @@ class CameraOptions:
     # In every mode photos of different size have different cameras: COLMAP would reject them in the
     # modes single and per-folder; here no photo is lost. Portrait and landscape differ in size.
     mode: CameraMode = "auto"
-    # A COLMAP camera model.
-    model: str = "SIMPLE_RADIAL"
+    # A COLMAP camera model, which stays; or auto: SIMPLE_RADIAL, which at the end becomes RADIAL or
+    # OPENCV where the photos bear it out (mapping/lens_growth.py). With params, it stays as well.
+    model: str = AUTO
     # Known calibration, in COLMAP's order and in pixels of the file. It applies to the first photo
     # and all of its size; photos of other sizes start from their own focal length.
     params: tuple[float, ...] | None = None
@@ -55,8 +59,10 @@ class CameraOptions:
             modes = ", ".join(get_args(CameraMode))
             raise ConfigError(f"camera mode must be one of {modes}, got {self.mode}")
         models = [name for name in pycolmap.CameraModelId.__members__ if name != "INVALID"]
-        if self.model not in models:
-            raise ConfigError(f"camera model must be one of {', '.join(models)}, got {self.model}")
+        if self.model not in (AUTO, *models):
+            raise ConfigError(
+                f"camera model must be {AUTO} or one of {', '.join(models)}, got {self.model}"
+            )
         if self.photos_per_size < 1:
             raise ConfigError(f"photos_per_size must be at least 1, got {self.photos_per_size}")
         if not self.min_focal_factor > 0:
@@ -68,19 +74,29 @@ class CameraOptions:
             )
         if self.params is None:
             return
-        expected = pycolmap.Camera.create_from_model_name(1, self.model, 1.0, 1, 1)
+        expected = pycolmap.Camera.create_from_model_name(1, self.first_model, 1.0, 1, 1)
         if len(self.params) != len(expected.params):
             raise ConfigError(
-                f"camera params of {self.model} are {len(expected.params)} numbers "
+                f"camera params of {self.first_model} are {len(expected.params)} numbers "
                 f"({expected.params_info}), got {len(self.params)}"
             )
         if not all(math.isfinite(value) for value in self.params):
             raise ConfigError(f"camera params must be finite numbers, got {self.params}")
         if any(self.params[i] <= 0 for i in expected.focal_length_idxs()):
             raise ConfigError(
-                f"camera params of {self.model} ({expected.params_info}): "
+                f"camera params of {self.first_model} ({expected.params_info}): "
                 f"focal lengths must be above 0, got {self.params}"
             )
+
+    @property
+    def first_model(self) -> str:
+        """The COLMAP camera model that cameras start with."""
+        return "SIMPLE_RADIAL" if self.model == AUTO else self.model
+
+    @property
+    def may_grow(self) -> bool:
+        """Whether a camera may end with a richer model."""
+        return self.model == AUTO and self.params is None
 
 
 def folder_of(name: str) -> str:
@@ -176,7 +192,7 @@ class CameraCatalog:
         prior = focal_prior_px(photo, self._options)
         camera = pycolmap.Camera.create_from_model_name(
             self._last_id + 1,
-            self._options.model,
+            self._options.first_model,
             prior or DEFAULT_FOCAL_FACTOR * max(photo.width, photo.height),
             photo.width,
             photo.height,

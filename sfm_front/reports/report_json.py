@@ -8,6 +8,7 @@ from typing import Any
 
 from sfm_front.errors import InputError
 from sfm_front.georeference.sidecar import as_row, of_row
+from sfm_front.reports.camera_outcome import camera_rows, cameras_from_rows
 from sfm_front.reports.run_summary import (
     AuditOutcome,
     GeoreferenceOutcome,
@@ -47,6 +48,7 @@ def write_report(output: Path, summary: RunSummary) -> None:
         "end": {"seconds": _rounded(summary.end_seconds), "events": summary.end_events},
         "look_alikes": summary.look_alikes,
         "georeference": _georeference_row(summary.georeference),
+        "cameras": camera_rows(summary.cameras),
         "totals": {
             "photos": totals.num_photos,
             "used": totals.num_used,
@@ -176,6 +178,7 @@ def _summary(content: dict[str, Any]) -> RunSummary:
             for groups in content.get("look_alikes", ())  # absent in reports of earlier versions
         ),
         georeference=_georeference(content.get("georeference")),  # absent in earlier versions
+        cameras=cameras_from_rows(content.get("cameras", ())),  # absent in earlier versions
     )
 
 

@@ -19,6 +19,7 @@ from sfm_front.events import (
     PhotoAdded,
 )
 from sfm_front.mapping.audit import ModelAudit
+from sfm_front.reports.camera_outcome import CameraOutcome
 from sfm_front.reports.run_summary import (
     AuditOutcome,
     GeoreferenceOutcome,
@@ -73,6 +74,7 @@ class RunReport:
         events: Sequence[ModelEvent],
         latencies_s: Sequence[float],
         georeference: GeoreferenceOutcome | None = None,
+        cameras: Sequence[CameraOutcome] = (),
     ) -> RunSummary:
         """Sum up.
 
@@ -103,6 +105,7 @@ class RunReport:
             totals=self._totals(models, len(model_of), seconds, latencies_s),
             look_alikes=self._look_alikes(events),
             georeference=georeference,
+            cameras=tuple(cameras),
         )
 
     def _look_alikes(self, events: Iterable[ModelEvent]) -> tuple[tuple[tuple[str, ...], ...], ...]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from sfm_front.reports.camera_outcome import CameraOutcome
 from sfm_front.types import Skipped
 
 if TYPE_CHECKING:  # The command line reads this before anything heavy may be loaded.
@@ -136,7 +137,7 @@ class RunSummary:
 
     ``end_events`` are those of idle times, too. ``look_alikes``: names of the photos of two groups
     that show things that look alike, each time a model was taken apart for it. ``georeference``:
-    None where nothing is known of positions.
+    None where nothing is known of positions. ``cameras``: of each model.
     """
 
     photos: tuple[Outcome, ...]
@@ -146,6 +147,7 @@ class RunSummary:
     totals: Totals
     look_alikes: tuple[tuple[tuple[str, ...], ...], ...] = ()
     georeference: GeoreferenceOutcome | None = None
+    cameras: tuple[CameraOutcome, ...] = ()
 
     @property
     def control_points(self) -> ControlReport | None:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from sfm_front.reports.camera_outcome import camera_warnings
 from sfm_front.reports.control_words import control_lines
 from sfm_front.reports.run_summary import AuditOutcome, RunSummary
 
@@ -33,6 +34,7 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
         )
         if model.audit and model.audit.is_doubtful:
             lines.append(f"    {_doubt(model.audit)}")
+        lines += [f"    {line}" for line in camera_warnings(summary.cameras, model.path)]
     if summary.georeference is not None:
         lines += georeference_lines(summary.georeference)
     if summary.control_points is not None:

@@ -44,8 +44,8 @@ def _default_cache_bytes() -> int:
 class SessionOptions:
     """How photos are described, retrieved, matched and mapped.
 
-    ``max_features``, ``threads`` and ``seed`` reach every part from here: what a part is given for
-    them is replaced.
+    ``max_features``, ``threads`` and ``seed`` reach every part from here, as does whether cameras
+    grow: what a part is given for them is replaced.
     """
 
     # Long side that photos are reduced to, in pixels.
@@ -112,7 +112,9 @@ class SessionOptions:
             raise ConfigError(f"snapshot_seconds must be above 0, got {self.snapshot_seconds}")
         if self.cache_mb is not None and self.cache_mb < 1:
             raise ConfigError(f"cache_mb must be at least 1, got {self.cache_mb}")
-        mapper = replace(self.atlas.mapper, num_threads=self.threads, seed=self.seed)
+        mapper = self.atlas.mapper
+        calibration = replace(mapper.calibration, grow_lens=self.cameras.may_grow)
+        mapper = replace(mapper, num_threads=self.threads, seed=self.seed, calibration=calibration)
         localization = replace(self.atlas.localization, seed=self.seed)
         atlas = replace(self.atlas, mapper=mapper, localization=localization)
         object.__setattr__(self, "atlas", atlas)

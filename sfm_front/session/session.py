@@ -25,6 +25,7 @@ from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.unfolding import unfold
+from sfm_front.reports.camera_outcome import CameraOutcome, camera_outcomes
 from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.report_json import write_report
 from sfm_front.reports.retrieval_log import RetrievalLog
@@ -274,6 +275,7 @@ class Session(Closeable):
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
             georeference=positions,
+            cameras=self._camera_outcomes(models),
         )
         write_report(self.output, summary)
         mark_finished(self.database)
@@ -298,6 +300,20 @@ class Session(Closeable):
 
     def _georeference(self) -> None:
         self._parts.georeferencing.settle(self._parts.atlas.models)
+
+    def _camera_outcomes(self, models: Sequence[ModelSummary]) -> list[CameraOutcome]:
+        limit = self.options.atlas.mapper.calibration.max_focal_sigma
+        return [
+            outcome
+            for written, model in zip(models, self._parts.atlas.models, strict=True)
+            for outcome in camera_outcomes(
+                f"{written.path.parent.name}/{written.path.name}",
+                model.reconstruction,
+                self._parts.view_graph.cameras,
+                model.focal_sigmas,
+                limit,
+            )
+        ]
 
     def _hint(self, image_id: int) -> str:
         atlas = self._parts.atlas

@@ -48,10 +48,11 @@ CONSTANTS = (
         "inliers of the second re-ranking below which a pair is not matched on all features",
     ),
     Constant(
-        "principal-point-gain",
+        "lens-gain",
         "atlas.mapper.calibration.min_gain",
-        (0.0, 0.02, 0.035, 0.05, 0.99),
-        "fall of the median error for which a refined principal point is kept; 0.99: never",
+        (0.0, 0.005, 0.01, 0.02, 0.035, 0.99),
+        "fall of the median error for which a richer lens or a refined principal point is kept; "
+        "0.99: never",
     ),
     Constant(
         "retry-growth",

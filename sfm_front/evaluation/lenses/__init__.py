@@ -1,0 +1,1 @@
+"""Scenes as if their photos had been taken through other lenses."""
