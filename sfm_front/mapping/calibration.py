@@ -25,7 +25,7 @@ class CalibrationOptions:
     max_shift: float = 0.025
     # Standard deviation of the focal length as a share of it, up to which photos determine their
     # camera (TUNING: focal-sigma).
-    max_focal_sigma: float = 0.003
+    max_focal_sigma: float = 0.004
 
     def __post_init__(self) -> None:
         if self.min_photos < 1:

@@ -88,12 +88,13 @@ class LensEvidence:
         return float(np.clip(self.gradient[list(params)] @ step / self.cost, 0.0, 1.0))
 
     def focal_sigma(self, params: Collection[Param]) -> float:
-        """Standard deviation of the focal length, as a share of it, if these are unknown.
+        """Standard deviation of the focal length, as a share of it, once these have moved.
 
-        ``params`` begin with the focal length. By the residuals alone: no lens of another kind, no
-        wrong match that many points share is in it.
+        ``params`` begin with the focal length. By the residuals that are left: no lens of another
+        kind, no wrong match that many points share is in it.
         """
-        variance = self._inverse(params)[0, 0] * self.cost / self.redundancy * self.share
+        left = self.cost * (1 - self.explained(params))
+        variance = self._inverse(params)[0, 0] * left / self.redundancy * self.share
         return float(np.sqrt(max(variance, 0.0))) / self.focal_px
 
     def _inverse(self, params: Collection[Param]) -> Float64Array:
