@@ -17,10 +17,9 @@ class CalibrationOptions:
     grow_lens: bool = True
     # Photos that must share the camera.
     min_photos: int = 8
-    # Share of the median reprojection error that each step must take away (TUNING: lens-gain).
+    # Share of the median reprojection error that each step must take away (TUNING: lens-gain), and
+    # that residuals must promise for it to be tried (TUNING: lens-promise).
     min_gain: float = 0.01
-    # Share of that which the residuals must promise for a lens to be tried (TUNING: lens-promise).
-    promising: float = 0.8
     # Of the long side; a model that wants its principal point farther out is not determined.
     max_shift: float = 0.025
     # Standard deviation of the focal length as a share of it, up to which photos determine their
@@ -34,8 +33,6 @@ class CalibrationOptions:
             value = getattr(self, name)
             if not 0 <= value < 1:
                 raise ConfigError(f"{name} must be from 0 to below 1, got {value}")
-        if not 0 <= self.promising <= 1:
-            raise ConfigError(f"promising must be from 0 to 1, got {self.promising}")
 
 
 def photos_by_camera(reconstruction: pycolmap.Reconstruction) -> dict[int, list[int]]:

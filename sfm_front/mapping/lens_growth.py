@@ -155,7 +155,7 @@ def _most_promising(
     best, most = None, 0.0
     for lens in lenses:
         fall = 1 - (1 - evidence.explained(lens.params)) / unexplained
-        beyond = fall - options.promising * options.min_gain * _steps(camera, lens)
+        beyond = fall - options.min_gain * _steps(camera, lens)
         if beyond > most and evidence.focal_sigma(lens.params) <= options.max_focal_sigma:
             best, most = lens, beyond
     return best

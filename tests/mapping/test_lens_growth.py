@@ -78,7 +78,6 @@ def test_one_of_two_cameras_grows():
         {"min_photos": 0},
         {"min_gain": 1},
         {"max_shift": -1},
-        {"promising": 2},
         {"max_focal_sigma": -1},
     ],
 )
