@@ -310,7 +310,6 @@ class Model:
         if not self.is_miscalibrated:
             for image_id in impossible_photos(self.reconstruction, self._mapping):
                 self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
-        self._mapper.end_reconstruction(False)
         self._end_as(self.reconstruction)
 
     def _end_as(self, reconstruction: pycolmap.Reconstruction) -> None:
