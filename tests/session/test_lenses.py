@@ -54,8 +54,9 @@ def test_the_camera_grows_at_the_end_and_the_report_says_so(ring, tmp_path):
         with Session(tmp_path / model, options(model=model)) as session:
             for index in range(NUM_PHOTOS):
                 session.add_extracted(described(ring, index))
-            # One that fits nowhere: what it sees of the finished model is asked for the report.
-            session.add_extracted(described(elsewhere, 0, prefix="elsewhere_"))
+            # Two that fit nowhere: what they see of the finished model is asked for the report.
+            for index in range(2):
+                session.add_extracted(described(elsewhere, index, prefix="elsewhere_"))
             (finished,) = session.finish().models
         medians[model] = np.median(pose_errors(ring.truth(), [finished.reconstruction]))
         (camera,) = read_report(tmp_path / model).cameras
