@@ -180,7 +180,7 @@ def test_a_file_in_place_of_a_folder(photo, tmp_path, capsys):
         (["--camera-params=-5,100,75,0"], "focal lengths must be above 0"),
         (["--camera-params", "100,nan,75,0"], "camera params must be finite numbers"),
         (["--camera-model", "PINHOLE", "--camera-params", "9,9,9"], "camera params of PINHOLE"),
-        (["--camera-model", "BOX"], "camera model must be one of"),
+        (["--camera-model", "BOX"], "camera model must be auto or one of"),
         (["--camera-mode", "one"], "camera mode must be one of auto, single"),
         (["--order", "size"], "order must be one of name, time, random, got size"),
         (["--max-features", "0"], "max_features must be at least 1, got 0"),

@@ -136,6 +136,16 @@ def test_a_model_most_of_whose_cameras_cannot_be_says_so_and_keeps_its_photos(or
     assert model.registered == set(ids)
 
 
+def test_a_finished_model_still_says_what_waiting_photos_see_of_it(orbit):
+    feed = SceneFeed(orbit)
+    ids = feed.add_all(range(8))
+    model = started(feed)
+    model.grow(ids[:6])
+    model.finish()
+    assert ids[7] not in model.registered
+    assert model.num_visible_points(ids[6]) > 30
+
+
 def test_photos_that_see_nothing_of_it_are_left_alone(orbit):
     feed = SceneFeed(orbit)
     feed.add_all([0, 1, 2])

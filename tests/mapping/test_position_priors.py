@@ -51,7 +51,7 @@ def grown(first) -> Model:
 @pytest.fixture(scope="module")
 def adjusted(flight, first) -> pycolmap.Reconstruction:
     """As the photos alone have it, moved to the world of the flight."""
-    model = final_adjustment(copy.deepcopy(first.reconstruction), ADJUSTMENT)
+    model = final_adjustment(copy.deepcopy(first.reconstruction), ADJUSTMENT).reconstruction
     model.transform(world_from(model, flight))
     return model
 
