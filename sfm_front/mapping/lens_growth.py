@@ -100,9 +100,11 @@ def simplify_lenses(
     cameras: Mapping[int, pycolmap.Camera],
     adjustment: RobustAdjustmentOptions,
 ) -> None:
-    """Give a finished model that is to go on growing the simple lenses of these ``cameras``, by id.
+    """Give a finished model that is to go on growing the simple lenses of these ``cameras``, by id,
+    and their principal points.
 
-    All models over one view graph must have the same; its own were richer if they had grown.
+    All models over one view graph must have the same; its own were richer if they had grown. What
+    few photos bore out must not stay because more of them promise little beyond it.
     """
     are_others = False
     for camera_id, camera in reconstruction.cameras.items():
@@ -110,8 +112,15 @@ def simplify_lenses(
         if camera.model != first.model:
             take_intrinsics(camera, simplified(camera, first.model_name))
             are_others = True
+        if _principal_point(camera) != _principal_point(first):
+            camera.principal_point_x, camera.principal_point_y = _principal_point(first)
+            are_others = True
     if are_others:
         adjust_robustly(reconstruction, adjustment, principal_point=False)
+
+
+def _principal_point(camera: pycolmap.Camera) -> tuple[float, float]:
+    return camera.principal_point_x, camera.principal_point_y
 
 
 def _plan(
@@ -198,10 +207,7 @@ def _is_borne_out(
 
 
 def _is_plausible(camera: pycolmap.Camera, options: CalibrationOptions) -> bool:
-    shift_px = math.dist(
-        (camera.principal_point_x, camera.principal_point_y),
-        (camera.width / 2, camera.height / 2),
-    )
+    shift_px = math.dist(_principal_point(camera), (camera.width / 2, camera.height / 2))
     limits = pycolmap.IncrementalMapperOptions()
     return (
         shift_px <= options.max_shift * max(camera.width, camera.height)

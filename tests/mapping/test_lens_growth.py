@@ -12,7 +12,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, adjust_robustly
 from sfm_front.mapping.calibration import CalibrationOptions
-from sfm_front.mapping.lens_growth import with_grown_lenses
+from sfm_front.mapping.lens_growth import simplify_lenses, with_grown_lenses
 
 OPENCV = (-0.1, 0.02, 0.002, -0.003)
 FISHEYE = (-0.3, 0.12)  # OPENCV's terms of an equidistant lens, roughly
@@ -84,3 +84,28 @@ def test_one_of_two_cameras_grows():
 def test_values_out_of_range_are_refused_by_name(wrong):
     with pytest.raises(ConfigError, match=next(iter(wrong))):
         CalibrationOptions(**wrong)
+
+
+def test_a_model_that_goes_on_has_its_simple_lens_and_principal_point_back():
+    """What few photos bore out must not stay because more of them promise little beyond it."""
+    first = camera_of("SIMPLE_RADIAL", (-0.1,))
+    finished = as_mapped(true_model(camera_of("OPENCV", OPENCV)))
+    camera = finished.camera(1)
+    camera.model, camera.params = first.model, first.params
+    camera.principal_point_x += 8
+    camera.principal_point_y -= 6
+    simplify_lenses(finished, {1: first}, RobustAdjustmentOptions())
+    assert camera.model_name == "SIMPLE_RADIAL"
+    assert (camera.principal_point_x, camera.principal_point_y) == (
+        first.principal_point_x,
+        first.principal_point_y,
+    )
+    assert end_of(finished).camera(1).model_name == "OPENCV"
+
+
+def test_a_model_whose_lenses_never_grew_is_left_alone():
+    first = camera_of("SIMPLE_RADIAL", (-0.1,))
+    model = as_mapped(true_model(first))
+    before = model.image(1).cam_from_world().matrix()
+    simplify_lenses(model, {1: first}, RobustAdjustmentOptions())
+    np.testing.assert_array_equal(model.image(1).cam_from_world().matrix(), before)
