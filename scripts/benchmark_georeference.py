@@ -16,18 +16,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from sfm_front.cli.progress import CountLine
-from sfm_front.errors import SfmFrontError
 from sfm_front.evaluation.georeference.table import format_trials
 from sfm_front.evaluation.georeference.trial import GeoreferenceTrial, run_trial
-from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.tuning.scene_arguments import (
     add_scene_arguments,
     chosen_options,
     chosen_scenes,
-    chosen_settings,
 )
+from sfm_front.evaluation.tuning.scene_script import exit_status, write_figures
 from sfm_front.evaluation.tuning.trials import counter, describe
-from sfm_front.storage.json_files import write_json
 
 
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
@@ -42,33 +39,18 @@ def run(args: argparse.Namespace) -> None:
     progress = CountLine("photo", sys.stderr)
     # Each is described and taken in.
     count = counter(progress.show, 2 * sum(scene.num_photos for scene in scenes))
-
-    import pycolmap
-
-    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     done: list[GeoreferenceTrial] = []
     for scene in scenes:
         described = describe(scene, args.cache, options, count)
         done.append(run_trial(scene.name, described, options, count))
         progress.note(f"{scene.name}: {done[-1].state}")
-        if args.json:
-            content = {
-                "settings": chosen_settings(args),
-                "machine": machine(),
-                "trials": [asdict(trial) for trial in done],
-            }
-            write_json(args.json, content)
+        write_figures(args, "trials", [asdict(trial) for trial in done])
     progress.end()
     print(format_trials(done))
 
 
 def main() -> int:
-    try:
-        run(parse())
-    except SfmFrontError as error:
-        print(f"benchmark_georeference: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return exit_status("benchmark_georeference", parse, run)
 
 
 if __name__ == "__main__":

@@ -16,19 +16,16 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from sfm_front.cli.progress import CountLine
-from sfm_front.errors import SfmFrontError
 from sfm_front.evaluation.lenses.rendering import LENSES, check_lenses
 from sfm_front.evaluation.lenses.trials import MODELS, LensTrial, format_trials, try_lens
-from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.tuning.scene_arguments import (
     add_scene_arguments,
     chosen_options,
     chosen_scenes,
-    chosen_settings,
 )
+from sfm_front.evaluation.tuning.scene_script import exit_status, write_figures
 from sfm_front.evaluation.tuning.trials import counter
 from sfm_front.photos.cameras import CameraOptions
-from sfm_front.storage.json_files import write_json
 
 
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
@@ -61,33 +58,18 @@ def run(args: argparse.Namespace) -> None:
     progress = CountLine("photo", sys.stderr)
     photos = sum(scene.num_photos for scene in scenes)
     count = counter(progress.show, photos * len(lenses) * (1 + len(models)))
-
-    import pycolmap
-
-    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     done: list[LensTrial] = []
     for scene in scenes:
         for lens in lenses:
             done += try_lens(scene, lens, models, args.renders, args.cache, options, count)
             progress.note(f"{scene.name} through {lens}: tried")
-            if args.json:
-                content = {
-                    "settings": chosen_settings(args),
-                    "machine": machine(),
-                    "trials": [asdict(one) for one in done],
-                }
-                write_json(args.json, content)
+            write_figures(args, "trials", [asdict(one) for one in done])
     progress.end()
     print(format_trials(done))
 
 
 def main() -> int:
-    try:
-        run(parse())
-    except SfmFrontError as error:
-        print(f"benchmark_lenses: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return exit_status("benchmark_lenses", parse, run)
 
 
 if __name__ == "__main__":

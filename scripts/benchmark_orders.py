@@ -14,18 +14,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from sfm_front.cli.progress import CountLine
-from sfm_front.errors import SfmFrontError
-from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.robustness.tables import format_orders
 from sfm_front.evaluation.tuning.arrangements import check_arrangements
 from sfm_front.evaluation.tuning.scene_arguments import (
     add_scene_arguments,
     chosen_options,
     chosen_scenes,
-    chosen_settings,
 )
+from sfm_front.evaluation.tuning.scene_script import exit_status, write_figures
 from sfm_front.evaluation.tuning.trials import Trial, counter, describe, num_photos, try_scene
-from sfm_front.storage.json_files import write_json
 
 
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
@@ -49,33 +46,18 @@ def run(args: argparse.Namespace) -> None:
     progress = CountLine("photo", sys.stderr)
     total = sum(num_photos(scene, arrangements) for scene in scenes)
     count = counter(progress.show, total)
-
-    import pycolmap
-
-    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     done: list[Trial] = []
     for scene in scenes:
         described = describe(scene, args.cache, options, count)
         done += try_scene(scene, described, arrangements, [options], count).values()
         progress.note(f"{scene.name}: reconstructed")
-        if args.json:
-            content = {
-                "settings": chosen_settings(args),
-                "machine": machine(),
-                "trials": [asdict(trial) for trial in done],
-            }
-            write_json(args.json, content)
+        write_figures(args, "trials", [asdict(trial) for trial in done])
     progress.end()
     print(format_orders(done))
 
 
 def main() -> int:
-    try:
-        run(parse())
-    except SfmFrontError as error:
-        print(f"benchmark_orders: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return exit_status("benchmark_orders", parse, run)
 
 
 if __name__ == "__main__":

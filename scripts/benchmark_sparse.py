@@ -16,8 +16,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from sfm_front.cli.progress import CountLine
-from sfm_front.errors import ConfigError, SfmFrontError
-from sfm_front.evaluation.machine import machine
+from sfm_front.errors import ConfigError
 from sfm_front.evaluation.reconstruction.scenes import with_landmarks
 from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
 from sfm_front.evaluation.robustness.sparse import ORDERS, Comparison, compare
@@ -27,10 +26,9 @@ from sfm_front.evaluation.tuning.scene_arguments import (
     add_scene_arguments,
     chosen_options,
     chosen_scenes,
-    chosen_settings,
 )
+from sfm_front.evaluation.tuning.scene_script import exit_status, write_figures
 from sfm_front.evaluation.tuning.trials import counter, describe, num_photos
-from sfm_front.storage.json_files import write_json
 
 
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
@@ -78,10 +76,6 @@ def run(args: argparse.Namespace) -> None:
     arrangements = [f"{thinning}-{order}" for thinning in thinnings for order in ORDERS]
     total = sum(num_photos(scene, arrangements) for scene in scenes)
     count = counter(progress.show, total)
-
-    import pycolmap
-
-    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     done: list[Comparison] = []
     for scene in scenes:
         described = describe(scene, args.cache, options, count)
@@ -90,24 +84,15 @@ def run(args: argparse.Namespace) -> None:
                 compare(scene, described, thinning, args.rivals, rival_settings, options, count)
             )
         progress.note(f"{scene.name}: compared")
-        if args.json:
-            content = {
-                "settings": chosen_settings(args) | asdict(rival_settings),
-                "machine": machine(),
-                "comparisons": [one.as_dict() for one in done],
-            }
-            write_json(args.json, content)
+        write_figures(
+            args, "comparisons", [one.as_dict() for one in done], **asdict(rival_settings)
+        )
     progress.end()
     print(format_comparisons(done))
 
 
 def main() -> int:
-    try:
-        run(parse())
-    except SfmFrontError as error:
-        print(f"benchmark_sparse: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return exit_status("benchmark_sparse", parse, run)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from sfm_front.exporters.colmap import STATE, damaged_file
 from sfm_front.exporters.options import ExportOptions
 from sfm_front.geometry.enu import LocalFrame
 from sfm_front.georeference.sidecar import FILE_NAME, read_sidecar
-from sfm_front.photos.source import find_photos
+from sfm_front.photos.source import files_by_name
 from sfm_front.storage.colmap_models import find_models, is_model, read_model
 from sfm_front.storage.database import DATABASE
 from sfm_front.storage.session_photos import read_photos
@@ -70,11 +70,7 @@ def read_scene(source: Path, *, number: int | None = None, images: Path | None =
     stored = read_photos(output / DATABASE) or []
     photos = {photo.name: photo.path for photo in stored}
     if images is not None:
-        if not images.is_dir():
-            raise InputError(f"{images}: no such folder. Give the folder of the photos.")
-        # By the rules that named them, so that no name leads out of the folder.
-        found = find_photos(images, exclude=None, on_error=lambda _error: None)
-        photos = {photo.name: photo.path for photo in found}
+        photos = files_by_name(images)
     positions = {photo.name: p for photo in stored if (p := photo.exif.position) is not None}
     return Scene(model, photos, positions, _frame(folder))
 

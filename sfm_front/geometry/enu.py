@@ -24,10 +24,15 @@ class LocalFrame:
     altitude_m: float
 
     def to_enu(self, lat_lon_alt: Float64Array) -> Float64Array:
-        """(N, 3) latitude and longitude in degrees, altitude in metres → (N, 3) metres."""
+        """(N, 3) latitude and longitude in degrees, altitude in metres → (N, 3) metres; where the
+        altitude is nan, so is up, and east and north are as at the origin's."""
+        places = np.asarray(lat_lon_alt, np.float64).reshape(-1, 3)
+        unknown = np.isnan(places[:, 2])
+        level = np.where(unknown, self.altitude_m, places[:, 2])
         enu: Float64Array = _wgs84().ellipsoid_to_enu(
-            np.asarray(lat_lon_alt, np.float64).reshape(-1, 3), *self._origin
+            np.column_stack([places[:, :2], level]), *self._origin
         )
+        enu[unknown, 2] = np.nan
         return enu
 
     def to_wgs84(self, enu: Float64Array) -> Float64Array:

@@ -77,6 +77,19 @@ class Georeference:
             {self.image_ids[row]: np.minimum(sigmas[row], _UNKNOWN_M) for row in rows},
         )
 
+    @property
+    def in_enu(self) -> Georeference:
+        """The same of the model once it has been moved by the alignment."""
+        alignment = self.alignment
+        if alignment is None:
+            return self
+        moved = alignment.enu_from_model
+        return replace(
+            self,
+            alignment=replace(alignment, enu_from_model=pycolmap.Sim3d()),
+            cam_from_model=tuple(moved.transform_camera_world(p) for p in self.cam_from_model),
+        )
+
 
 class Georeferencer:
     """Says after each photo where the model stands.
@@ -273,11 +286,7 @@ def _frame_at(positions: Sequence[PhotoPosition]) -> LocalFrame:
 
 
 def _fixes(positions: Sequence[PhotoPosition], frame: LocalFrame) -> Fixes:
-    degrees = lat_lon_alt(one.position for one in positions)
-    unknown = np.isnan(degrees[:, 2])
-    degrees[unknown, 2] = frame.altitude_m
-    enu = frame.to_enu(degrees)
-    enu[unknown, 2] = np.nan
+    enu = frame.to_enu(lat_lon_alt(one.position for one in positions))
     sigmas = np.array(
         [
             (one.horizontal_sigma_m, one.horizontal_sigma_m, one.vertical_sigma_m)

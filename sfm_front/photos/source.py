@@ -76,6 +76,15 @@ def find_photos(
     return photos
 
 
+def files_by_name(folder: Path) -> dict[str, Path]:
+    """Photos that have moved since, by the names that models have for them; by the rules that named
+    them, so that no name leads out of the folder. Raises InputError if there is no such folder."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder. Give the folder of the photos.")
+    found = find_photos(folder, exclude=None, on_error=lambda _error: None)
+    return {photo.name: photo.path for photo in found}
+
+
 def folder_identity(folder: Path) -> tuple[int, int] | None:
     """Device and inode: the same by whatever path it is reached; None if it cannot be entered."""
     return next(iter(_identities(folder)), None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -50,10 +51,7 @@ def camera_outcomes(
 ) -> list[CameraOutcome]:
     """Of a finished model. ``first_cameras``: as photos came with them, by id; ``focal_sigmas``: of
     those that have photos enough; up to ``max_focal_sigma`` they are determined."""
-    photos: dict[int, int] = {}
-    for image_id in reconstruction.reg_image_ids():
-        camera_id = reconstruction.image(image_id).camera_id
-        photos[camera_id] = photos.get(camera_id, 0) + 1
+    photos = Counter(reconstruction.image(i).camera_id for i in reconstruction.reg_image_ids())
     outcomes = []
     for camera_id, num_photos in sorted(photos.items()):
         camera, first = reconstruction.camera(camera_id), first_cameras[camera_id]

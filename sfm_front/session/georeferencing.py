@@ -67,8 +67,7 @@ class Georeferencing:
         A frame that no positions have fixed is not kept: the next run, whose control points may be
         others, begins without.
         """
-        before = self._enu_from_built.get(model.model_id)
-        built = enu_from_model if before is None else enu_from_model * before
+        built = self._from_built(model, enu_from_model)
         if model.is_georeferenced:
             self._enu_from_built[model.model_id] = built
         self._controlled = _Controlled(model.model_id, frame, built, reason)
@@ -181,6 +180,11 @@ class Georeferencing:
             self._looked_at[models[number].model_id] = len(self._positions)
             self._look_at(models[number], measured, is_largest=number == 0)
 
+    def _from_built(self, model: Model, enu_from_model: pycolmap.Sim3d) -> pycolmap.Sim3d:
+        """From the frame in which the model was built, if this moves it now."""
+        before = self._enu_from_built.get(model.model_id)
+        return enu_from_model if before is None else enu_from_model * before
+
     def _poses(self, model: Model) -> dict[int, pycolmap.Rigid3d]:
         """Of its photos as they were held."""
         reconstruction, orientation_of = model.reconstruction, self._positions.orientation_of
@@ -193,15 +197,12 @@ class Georeferencing:
         self, model: Model, measured: Mapping[int, PhotoPosition], *, is_largest: bool
     ) -> None:
         look = self._georeferencer.update if is_largest else self._georeferencer.look_at
-        poses = self._poses(model)
-        found = look(poses, measured)
+        found = look(self._poses(model), measured)
         if found.state is GeoreferenceState.METRIC and found.alignment is not None:
             moved = found.alignment.enu_from_model
             model.georeference(moved, found.priors)
-            before = self._enu_from_built.get(model.model_id)
-            self._enu_from_built[model.model_id] = moved if before is None else moved * before
-            # Of the model as it stands now.
-            found = look({i: moved.transform_camera_world(p) for i, p in poses.items()}, measured)
+            self._enu_from_built[model.model_id] = self._from_built(model, moved)
+            found = found.in_enu
         if is_largest:
             self.georeference = found
             self._tell(model, found)

@@ -131,8 +131,12 @@ def read_pair(
     return PairGeometry(image_id1, image_id2, np.ascontiguousarray(matches), geometry)
 
 
+CAMERA_COLUMNS = "camera_id, model, width, height, params, prior_focal_length FROM cameras"
+"""What ``read_camera`` takes, and its table."""
+
+
 def read_camera(row: tuple[Any, ...]) -> pycolmap.Camera:
-    """The camera of a row of ``cameras``."""
+    """The camera of a row of ``CAMERA_COLUMNS``."""
     camera_id, model, width, height, params, has_prior = row
     camera = pycolmap.Camera(
         camera_id=camera_id,

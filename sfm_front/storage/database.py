@@ -14,6 +14,7 @@ from sfm_front.errors import StorageError
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.storage.atomic import write_atomically
 from sfm_front.storage.colmap_rows import (
+    CAMERA_COLUMNS,
     PAIR_COLUMNS,
     camera_rows,
     inlier_data,
@@ -199,9 +200,7 @@ class PhotoDatabase(Closeable):
 
     def cameras(self) -> dict[int, pycolmap.Camera]:
         """Camera id → camera, as photos started with it."""
-        rows = self._file.rows(
-            "SELECT camera_id, model, width, height, params, prior_focal_length FROM cameras"
-        )
+        rows = self._file.rows(f"SELECT {CAMERA_COLUMNS}")
         return {row[0]: read_camera(row) for row in rows}
 
     def pairs(self, image_id: int) -> list[PairGeometry]:

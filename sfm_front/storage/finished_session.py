@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,14 +12,9 @@ import numpy as np
 import pycolmap
 from numpy.typing import NDArray
 
-from sfm_front.storage.colmap_rows import read_camera
-from sfm_front.storage.session_photos import addresses
-from sfm_front.storage.session_rows import (
-    PHOTO_COLUMNS,
-    SKIPPED_COLUMNS,
-    read_photo,
-    read_skipped,
-)
+from sfm_front.storage.colmap_rows import CAMERA_COLUMNS, read_camera
+from sfm_front.storage.session_photos import read_only, stored_photos
+from sfm_front.storage.session_rows import SKIPPED_COLUMNS, read_skipped
 from sfm_front.types import GeoPosition, StoredPhoto
 
 
@@ -43,23 +37,13 @@ class FinishedSession:
 
 def read_finished_session(database: Path) -> FinishedSession:
     """An empty one if there is no such file, or it cannot be read, or is no session's."""
-    for address in addresses(database):
-        try:
-            with closing(sqlite3.connect(address, uri=True)) as connection:
-                return _read(connection)
-        except sqlite3.Error:
-            continue
-    return FinishedSession()
+    return read_only(database, _read) or FinishedSession()
 
 
 def _read(connection: sqlite3.Connection) -> FinishedSession:
-    photos = [
-        read_photo(row) for row in connection.execute(f"SELECT {PHOTO_COLUMNS} ORDER BY image_id")
-    ]
+    photos = stored_photos(connection)
     skipped = map(read_skipped, connection.execute(f"SELECT {SKIPPED_COLUMNS}"))
-    cameras = connection.execute(
-        "SELECT camera_id, model, width, height, params, prior_focal_length FROM cameras"
-    )
+    cameras = connection.execute(f"SELECT {CAMERA_COLUMNS}")
     pairs, num_matched = _pairs(connection, {p.image_id: p.num_keypoints for p in photos})
     return FinishedSession(
         photos=photos,

@@ -28,5 +28,8 @@ def test_the_way_back_is_exact() -> None:
     assert np.allclose(FRAME.to_enu(FRAME.to_wgs84(enu)), enu, atol=1e-5)
 
 
-def test_an_unknown_altitude_is_nan() -> None:
-    assert np.isnan(lat_lon_alt([GeoPosition(1.0, 2.0)])[0, 2])
+def test_of_an_unknown_altitude_only_up_is_not_known() -> None:
+    place = GeoPosition(52.001, 5.001)
+    enu = FRAME.to_enu(lat_lon_alt([place, GeoPosition(52.001, 5.001, 40.0)]))
+    assert np.isnan(enu[0, 2])
+    np.testing.assert_array_equal(enu[0, :2], enu[1, :2])

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import pycolmap
 
-from sfm_front.errors import InputError
 from sfm_front.geometry.enu import LocalFrame, lat_lon_alt
 from sfm_front.georeference.flight_figures import FlightFigures
 from sfm_front.georeference.sidecar import FILE_NAME, Sidecar, read_sidecar
-from sfm_front.photos.source import find_photos
+from sfm_front.photos.source import files_by_name
 from sfm_front.reports import event_log
 from sfm_front.reports.html.observations import Observations, observations_of
 from sfm_front.reports.report_json import read_report
@@ -90,12 +88,7 @@ class Material:
         if frame is None:
             return {}
         positions = self.session.positions
-        measured = lat_lon_alt(positions.values())
-        no_height = np.isnan(measured[:, 2])
-        measured[no_height, 2] = frame.altitude_m
-        enu = frame.to_enu(measured)
-        enu[no_height, 2] = np.nan
-        return dict(zip(positions, enu, strict=True))
+        return dict(zip(positions, frame.to_enu(lat_lon_alt(positions.values())), strict=True))
 
 
 def read_material(output: Path, photos: Path | None = None) -> Material:
@@ -108,11 +101,7 @@ def read_material(output: Path, photos: Path | None = None) -> Material:
     session = read_finished_session(output / DATABASE)
     files = {**session.skipped, **{photo.name: photo.path for photo in session.photos}}
     if photos is not None:
-        if not photos.is_dir():
-            raise InputError(f"{photos}: no such folder. Give the folder of the photos.")
-        # By the rules that named them, so that no name leads out of the folder.
-        found = find_photos(photos, exclude=None, on_error=lambda _error: None)
-        files = {photo.name: photo.path for photo in found}
+        files = files_by_name(photos)
     sidecar = output / "sparse" / FILE_NAME
     began, version = _beginning(output)
     return Material(
