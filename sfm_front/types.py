@@ -321,3 +321,8 @@ class ModelSummary:
     num_points: int
     mean_reprojection_error_px: float
     mean_track_length: float
+
+    @property
+    def path_in_output(self) -> str:
+        """Such as ``sparse/0``."""
+        return f"{self.path.parent.name}/{self.path.name}"

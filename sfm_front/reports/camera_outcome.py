@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from sfm_front.types import ModelSummary
+
 if TYPE_CHECKING:
     import pycolmap
 
@@ -43,14 +45,14 @@ class CameraOutcome:
 
 
 def camera_outcomes(
-    model_path: str,
-    reconstruction: pycolmap.Reconstruction,
+    model: ModelSummary,
     first_cameras: Mapping[int, pycolmap.Camera],
     focal_sigmas: Mapping[int, float],
     max_focal_sigma: float,
 ) -> list[CameraOutcome]:
-    """Of a finished model. ``first_cameras``: as photos came with them, by id; ``focal_sigmas``: of
+    """Of a model. ``first_cameras``: as photos came with them, by id; ``focal_sigmas``: of
     those that have photos enough; up to ``max_focal_sigma`` they are determined."""
+    reconstruction = model.reconstruction
     photos = Counter(reconstruction.image(i).camera_id for i in reconstruction.reg_image_ids())
     outcomes = []
     for camera_id, num_photos in sorted(photos.items()):
@@ -58,7 +60,7 @@ def camera_outcomes(
         sigma = focal_sigmas.get(camera_id)
         outcomes.append(
             CameraOutcome(
-                model_path=model_path,
+                model_path=model.path_in_output,
                 camera_id=camera_id,
                 num_photos=num_photos,
                 lens=camera.model_name,

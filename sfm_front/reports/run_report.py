@@ -91,7 +91,7 @@ class RunReport:
             photos=tuple(_outcome(photo, model_of, why_not, hints) for photo in self._photos),
             models=tuple(
                 ModelOutcome(
-                    f"{model.path.parent.name}/{model.path.name}",
+                    model.path_in_output,
                     model.num_registered,
                     model.num_points,
                     model.mean_reprojection_error_px,

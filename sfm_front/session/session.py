@@ -25,7 +25,6 @@ from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.unfolding import unfold
-from sfm_front.reports.camera_outcome import CameraOutcome, camera_outcomes
 from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.report_json import write_report
 from sfm_front.reports.retrieval_log import RetrievalLog
@@ -35,13 +34,13 @@ from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.session.announcer import Announcer
 from sfm_front.session.control_points import ControlPoints
-from sfm_front.session.hints import hint
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import check_output_folder, open_output_folder
 from sfm_front.session.parts import open_parts, restore
 from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.resume import as_dict, check_options, mark_finished, mark_running
 from sfm_front.session.snapshots import Snapshots, read_snapshot
+from sfm_front.session.summing_up import sum_up
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import (
     Candidate,
@@ -265,17 +264,15 @@ class Session(Closeable):
                 self._parts.atlas.models, self._parts.control_points.report
             )
             models = self._export(positions.sidecar if positions else None, final=True)
-        waiting = self._parts.atlas.waiting
-        summary = self._parts.report.finish(
+        summary = sum_up(
+            self._parts,
+            self.options,
             models,
-            {image_id: self._parts.atlas.why_not_registered(image_id) for image_id in waiting},
-            {image_id: self._hint(image_id) for image_id in waiting},
             audits=audits,
+            georeference=positions,
             seconds=clock.seconds,
             events=(*self._idle_events, *self._announcer.pop_model_events()),
             latencies_s=self._announcer.latencies_s,
-            georeference=positions,
-            cameras=self._camera_outcomes(models),
         )
         write_report(self.output, summary)
         mark_finished(self.database)
@@ -300,25 +297,6 @@ class Session(Closeable):
 
     def _georeference(self) -> None:
         self._parts.georeferencing.settle(self._parts.atlas.models)
-
-    def _camera_outcomes(self, models: Sequence[ModelSummary]) -> list[CameraOutcome]:
-        limit = self.options.atlas.mapper.calibration.max_focal_sigma
-        return [
-            outcome
-            for written, model in zip(models, self._parts.atlas.models, strict=True)
-            for outcome in camera_outcomes(
-                f"{written.path.parent.name}/{written.path.name}",
-                model.reconstruction,
-                self._parts.view_graph.cameras,
-                model.focal_sigmas,
-                limit,
-            )
-        ]
-
-    def _hint(self, image_id: int) -> str:
-        atlas = self._parts.atlas
-        nearest = self._parts.retriever.nearest(image_id, self.options.second_look.candidates)
-        return hint(image_id, atlas.view_graph, atlas.registered, nearest)
 
     def _placing_more(self, act: Callable[[], Result]) -> Result:
         """Do something that may place photos that wait, and tell of those."""

@@ -15,6 +15,7 @@ from PIL import Image
 
 from sfm_front.cli import reconstruct, retrieve
 from sfm_front.cli.main import main
+from sfm_front.cli.reconstruct_arguments import session_options
 from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.search.folder_search import SearchOptions
 from sfm_front.session.options import SessionOptions, available_cores
@@ -102,25 +103,23 @@ def test_help_tells_the_defaults_of_the_options_and_no_others(command):
 
 
 def test_the_seed_is_the_sessions_where_none_is_given():
-    options = reconstruct.session_options(parser().parse_args(["folder"]))
+    options = session_options(parser().parse_args(["folder"]))
     assert options.seed == options.verification.seed == SessionOptions().seed
 
 
 def test_what_is_not_given_is_the_sessions_default():
     arguments = parser().parse_args(["folder"])
-    assert reconstruct.session_options(arguments) == SessionOptions(
-        atlas=reconstruct.session_options(arguments).atlas
-    )
+    assert session_options(arguments) == SessionOptions(atlas=session_options(arguments).atlas)
 
 
 def test_models_stay_in_their_own_frame_where_that_is_wanted():
     given = parser().parse_args(["folder", "--georegister", "off"])
-    assert reconstruct.session_options(given).georegister == "off"
+    assert session_options(given).georegister == "off"
 
 
 def test_control_points_are_taken_as_given():
     given = ("--gcp", "gcp.txt", "--gcp-size", "4272,2848", "--gcp-accuracy", "0.5")
-    assert reconstruct.session_options(parser().parse_args(given)).control_points == ControlOptions(
+    assert session_options(parser().parse_args(given)).control_points == ControlOptions(
         file=Path("gcp.txt"),
         marked_size=(4272, 2848),
         horizontal_sigma_m=0.5,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pycolmap
 import pytest
@@ -16,6 +17,7 @@ from sfm_front.reports.camera_outcome import (
     camera_warnings,
     cameras_from_rows,
 )
+from sfm_front.types import ModelSummary
 
 POSE = looking([0, 0, 0], [0, 1, 0], [0, 0, 1])
 DRIFTED = CameraOutcome(
@@ -35,7 +37,8 @@ def outcome(prior: bool, sigmas: dict[int, float]) -> CameraOutcome:
     first = pycolmap.Camera.create_from_model_name(1, "SIMPLE_RADIAL", 0.8 * FOCAL, WIDTH, HEIGHT)
     first.has_prior_focal_length = prior
     model = make_model({"a.jpg": POSE, "b.jpg": POSE})
-    (found,) = camera_outcomes("sparse/0", model, {1: first}, sigmas, max_focal_sigma=0.003)
+    written = ModelSummary(Path("out/sparse/0"), model, 2, 0, 0.0, 0.0)
+    (found,) = camera_outcomes(written, {1: first}, sigmas, max_focal_sigma=0.003)
     return found
 
 
