@@ -26,7 +26,7 @@ class RobustAdjustmentOptions:
     # Relative change of the cost at which it stops, and that for large models: long flights stay
     # bent with the looser one (TUNING: robust-tolerance).
     tolerance: float = 1e-4
-    large_tolerance: float = 1e-6
+    large_tolerance: float = 1e-7
     # Whether focal length and distortion may move, and the principal point of an unknown camera.
     refine_intrinsics: bool = True
     num_threads: int = 2
