@@ -7,7 +7,7 @@ import time
 from typing import TextIO
 
 from sfm_front.events import ControlPointsRefused, Event, PhotoAdded
-from sfm_front.reports.summary import clock
+from sfm_front.reports.words import clock
 from sfm_front.types import Skipped
 
 
