@@ -12,6 +12,7 @@ from sfm_front.cli import explain, export, reconstruct, report, retrieve, view
 from sfm_front.cli.logs import add_logging, logging_to
 from sfm_front.cli.signals import INTERRUPTED
 from sfm_front.cli.streams import unfailing_streams
+from sfm_front.cli.terminal import printable
 from sfm_front.errors import SfmFrontError
 
 
@@ -52,7 +53,7 @@ def _run(arguments: argparse.Namespace) -> int:
         with logging_to(arguments.verbose, arguments.log_file):
             return run(arguments)
     except SfmFrontError as error:
-        print(f"sfm-front {arguments.command}: {error}", file=sys.stderr)
+        print(printable(f"sfm-front {arguments.command}: {error}"), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)

@@ -7,21 +7,26 @@ and it is placed in a model before the next one is taken.
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct_arguments import add_arguments as add_arguments
 from sfm_front.cli.reconstruct_arguments import session_options
 from sfm_front.cli.signals import leaving_at_signal
+from sfm_front.cli.terminal import painted, printable
 from sfm_front.errors import InputError
 from sfm_front.events import Listener
 from sfm_front.photos.source import list_photos, order_photos
+from sfm_front.reports import html
 from sfm_front.reports.summary import closing_summary
 
 if TYPE_CHECKING:
+    from sfm_front.reports.run_summary import RunSummary
     from sfm_front.session.options import SessionOptions
     from sfm_front.types import NotYet, PhotoPath
 
@@ -41,6 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.usage_error("--idle-timeout goes with --watch")
     if arguments.order != "name" and arguments.watch:
         arguments.usage_error("--watch takes photos as they come: leave --order out")
+    if arguments.events and arguments.json:
+        arguments.usage_error("--events and --json both take standard output: leave one out")
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
@@ -65,16 +72,17 @@ def run(arguments: argparse.Namespace) -> int:
         if not (arguments.watch or overwrite) and nothing_to_do(
             output, options, folder, photos, append=append
         ):
-            print(f"{output}: finished, and holds all photos of {folder}: nothing to do")
+            _tell_nothing_to_do(arguments, output)
             return 0
         if not arguments.watch and (overwrite or not holds_session(output)):
             _check_control_points(options, photos)
-        progress = ProgressLine(sys.stderr if arguments.events else sys.stdout)
+        spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
+        progress = ProgressLine(spoken, quiet=arguments.quiet)
         on_event = _event_printer() if arguments.events else progress.show
         session = Session(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
         )
-    with session, leaving_at_signal(2, _STOPPING) as interrupted:
+    with session, closing(progress), leaving_at_signal(2, _STOPPING) as interrupted:
         for message in session.messages:
             progress.note(message)
         if session.num_restored:
@@ -98,12 +106,61 @@ def run(arguments: argparse.Namespace) -> int:
         for _ in session.add_all(arriving):
             if interrupted():
                 break
-        progress.finishing()
         result = session.finish()
-        progress.end()
-        progress.note(closing_summary(result.summary, output, watched=arguments.watch))
-        progress.note(f"to look at: {write_page(output)}")
+        progress.step("drawing the page")
+        write_page(output)
+        progress.close()
+        _tell_result(arguments, result.summary, output, spoken)
     return 0 if result.models else 1
+
+
+def _tell_result(
+    arguments: argparse.Namespace, summary: RunSummary, output: Path, spoken: TextIO
+) -> None:
+    """In words, of which the first line is all that matters, or as JSON."""
+    from sfm_front.reports.verdict import verdict
+
+    if arguments.json:
+        _print_json(summary, output)
+    if arguments.json and arguments.quiet:
+        return
+    first, *details = closing_summary(
+        summary, output, watched=arguments.watch, with_stages=arguments.verbose > 0
+    ).splitlines()
+    level = verdict(summary, summary.sidecar).level
+    print(painted(printable(first), level, spoken), file=spoken)
+    if not arguments.quiet:
+        for line in (*details, *_next_steps(summary, output)):
+            print(printable(line), file=spoken)
+
+
+def _next_steps(summary: RunSummary, output: Path) -> list[str]:
+    """What to do with the result, to be copied."""
+    lines = [f"to look at: {output / html.FILE}"]
+    if summary.models:
+        model, folder = (
+            shlex.quote(str(path)) for path in (output / summary.models[0].path, output)
+        )
+        lines.append(f"            sfm-front view {model}")
+        lines.append(f"for other tools: sfm-front export {folder} --to nerfstudio")
+    return lines
+
+
+def _tell_nothing_to_do(arguments: argparse.Namespace, output: Path) -> None:
+    from sfm_front.reports.report_json import read_report
+
+    if arguments.json:
+        _print_json(read_report(output), output)
+    else:
+        folder = arguments.folder
+        print(printable(f"{output}: finished, and holds all photos of {folder}: nothing to do"))
+
+
+def _print_json(summary: RunSummary, output: Path) -> None:
+    from sfm_front.reports.result_json import result
+    from sfm_front.storage.json_files import as_json
+
+    print(as_json(result(summary, output)))
 
 
 def _event_printer() -> Listener:

@@ -72,6 +72,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with -, print what happens as lines of JSON instead of the progress line",
     )
     parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print the result as one JSON object; all else goes to standard error",
+    )
+    parser.add_argument(
         "--text",
         action=argparse.BooleanOptionalAction,
         help="whether to write models as text too; photo names must not hold spaces then",

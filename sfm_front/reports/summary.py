@@ -41,7 +41,7 @@ def closing_summary(
         lines += georeference_lines(summary.georeference)
     if summary.control_points is not None:
         lines += control_lines(summary.control_points)
-    lines += _reasons("left out", [(photo.name, str(photo), "") for photo in summary.skipped])
+    lines += _reasons("skipped", [(photo.name, str(photo), "") for photo in summary.skipped])
     lines += _reasons(
         "in no model",
         [

@@ -51,7 +51,7 @@ def verdict(summary: RunSummary, sidecar: Sidecar | None) -> Verdict:
         _placed(summary, sidecar, doubts),
         _elsewhere(summary),
         _missing(summary),
-        _left_out(summary),
+        _skipped(summary),
     )
     return Verdict(level, "; ".join(filter(None, parts)) + ".")
 
@@ -128,30 +128,30 @@ def _why_no_model(summary: RunSummary) -> str:
     if not summary.photos:
         return ": no photo came"
     if not summary.used:
-        return f": no photo could be read; {_left_out(summary)}"
+        return f": no photo could be read; {_skipped(summary)}"
     of = f" from {counted(len(summary.used), 'photo')}"
-    left_out = f"; {files}" if (files := _left_out(summary)) else ""
+    skipped = f"; {files}" if (files := _skipped(summary)) else ""
     if len(summary.used) == 1:
-        return f"{of}: it takes at least two that overlap{left_out}"
+        return f"{of}: it takes at least two that overlap{skipped}"
     # Each but the first can have pairs with earlier photos.
     if 2 * sum(photo.num_verified > 0 for photo in summary.used) >= len(summary.used):
         return (
             f"{of}: they overlap, but the camera hardly moved between them. Take each from "
-            f"another place; turning on the spot shows no depth{left_out}"
+            f"another place; turning on the spot shows no depth{skipped}"
         )
     return (
         f"{of}: they overlap too little. Take photos that overlap by two thirds and more, "
-        f"from different places{left_out}"
+        f"from different places{skipped}"
     )
 
 
-def _left_out(summary: RunSummary) -> str:
+def _skipped(summary: RunSummary) -> str:
     """Files that were skipped."""
-    skipped = summary.skipped
-    if not skipped:
+    files = summary.skipped
+    if not files:
         return ""
-    reasons = Counter(photo.reason.value for photo in skipped)
+    reasons = Counter(photo.reason.value for photo in files)
     reason, count = reasons.most_common(1)[0]
-    mostly = "mostly " if count < len(skipped) else ""
-    verb = "was" if len(skipped) == 1 else "were"
-    return f"{counted(len(skipped), 'file')} {verb} left out ({mostly}{reason})"
+    mostly = "mostly " if count < len(files) else ""
+    verb = "was" if len(files) == 1 else "were"
+    return f"{counted(len(files), 'file')} {verb} skipped ({mostly}{reason})"

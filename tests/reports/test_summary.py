@@ -63,9 +63,9 @@ def test_the_summary_says_what_became_of_all():
     ]
     told = [
         "2 of 3 photos are in one model; 1 found no place, because: no verified matches; "
-        "2 files were left out (mostly empty file).",
+        "2 files were skipped (mostly empty file).",
         f"  {Path('out/sparse/0')}: 2 photos, 1234 points, 0.43 px",
-        "left out:",
+        "skipped:",
         "  d.jpg: empty file",
         "  e.jpg: too small: 20 x 20",
         "in no model:",

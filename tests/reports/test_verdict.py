@@ -41,7 +41,7 @@ def waiting_for(*reasons: str, of: int = 9) -> RunSummary:
             None,
             Level.BAD,
             "All 9 photos are in one model, but some of their matches contradict it, as where "
-            "two things look alike; 1 file was left out (empty file).",
+            "two things look alike; 1 file was skipped (empty file).",
         ),
         (
             {"has_model": False},
@@ -134,5 +134,5 @@ def test_where_no_photo_came_or_none_could_be_read_more_overlap_is_no_advice():
     skipped = {"a.jpg": SkipReason.TRUNCATED, "b": SkipReason.TRUNCATED, "c": SkipReason.DUPLICATE}
     unread = summary_of(Output(num_photos=0, num_waiting=0, has_model=False, skipped=skipped))
     assert verdict(unread, None).sentence == (
-        "No model could be built: no photo could be read; 3 files were left out (mostly truncated)."
+        "No model could be built: no photo could be read; 3 files were skipped (mostly truncated)."
     )
