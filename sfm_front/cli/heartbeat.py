@@ -88,8 +88,10 @@ def _beat(encoding: str) -> None:
         said.set()
 
     threading.Thread(target=listen, daemon=True).start()
-    while not ended.is_set():
+    while True:
         said.clear()
+        if ended.is_set():
+            return
         if said.wait(every_s) or not (text and (on_terminal or is_long)):
             continue
         seconds = time.monotonic() - since
