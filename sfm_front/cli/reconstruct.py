@@ -24,6 +24,7 @@ from sfm_front.events import Listener
 from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports import html
 from sfm_front.reports.summary import closing_summary
+from sfm_front.reports.words import counted
 
 if TYPE_CHECKING:
     from sfm_front.reports.run_summary import RunSummary
@@ -87,6 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
             progress.note(message)
         if session.num_restored:
             progress.note(f"continuing {output}: {session.num_restored} photos are in it")
+        new: list[PhotoPath] = []
         newcomers = Newcomers(session.database, folder, output, append=append)
         arriving: Iterable[PhotoPath | NotYet]
         if arguments.watch:
@@ -103,7 +105,9 @@ def run(arguments: argparse.Namespace) -> int:
             new = list(newcomers.among(photos, progress.note))
             progress.expect(len(new))
             arriving = new
+        taken = 0
         for _ in session.add_all(arriving):
+            taken += 1
             if interrupted():
                 break
         result = session.finish()
@@ -111,6 +115,9 @@ def run(arguments: argparse.Namespace) -> int:
         write_page(output)
         progress.close()
         _tell_result(arguments, result.summary, output, spoken)
+        if not arguments.watch and taken < len(new):
+            left = counted(len(new) - taken, "photo")
+            print(f"stopped with {left} to go: the same command goes on from there", file=spoken)
     return 0 if result.models else 1
 
 

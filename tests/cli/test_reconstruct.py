@@ -240,7 +240,10 @@ def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypa
     interrupt_after(monkeypatch, 4, number)
     handler = signal.getsignal(number)
     assert reconstruct(five, tmp_path / "out") == 0
-    assert "stopping: finishing with the photos taken so far" in capfd.readouterr().err
+    told = capfd.readouterr()
+    assert "stopping: finishing with the photos taken so far" in told.err
+    last = "stopped with 1 photo to go: the same command goes on from there"
+    assert told.out.splitlines()[-1] == last
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 5)]
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
