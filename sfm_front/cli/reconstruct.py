@@ -145,11 +145,11 @@ def _next_steps(summary: RunSummary, output: Path) -> list[str]:
     """What to do with the result, to be copied."""
     lines = [f"to look at: {output / html.FILE}"]
     if summary.models:
-        model, folder = (
-            shlex.quote(str(path)) for path in (output / summary.models[0].path, output)
-        )
-        lines.append(f"            sfm-front view {model}")
-        lines.append(f"for other tools: sfm-front export {folder} --to nerfstudio")
+        folder = shlex.quote(str(output))
+        lines += [
+            f"            sfm-front view {folder}",
+            f"for other tools: sfm-front export {folder} --to nerfstudio",
+        ]
     return lines
 
 

@@ -18,9 +18,9 @@ from sfm_front.reports.words import counted
 from sfm_front.types import WaitingReason
 
 _CAUSES = {
-    WaitingReason.NO_MATCHES: "for too little overlap with any other photo",
-    WaitingReason.NEIGHBORS_WAIT: "for overlap only with photos that found no place either",
-    WaitingReason.NO_POSE: "for too little in common with the photos in the model",
+    WaitingReason.NO_MATCHES: "{they_share} too little with any other photo",
+    WaitingReason.NEIGHBORS_WAIT: "{they_share} something only with others of these",
+    WaitingReason.NO_POSE: "{they_share} too little with the photos in the model",
 }
 # Photos that found no place may be blurred or bare if they have less than this share of the
 # keypoints of the others. It decides nothing but the wording.
@@ -103,16 +103,17 @@ def _missing(summary: RunSummary) -> str:
     # A poor photo has no matches because it is poor.
     causes = [_cause(photo) for photo in missing]
     if _are_poor(missing, summary):
-        causes = ["for few details to go by, so they may be blurred or bare"]
+        causes = ["{they_share} few details with any photo, as if blurred or bare"]
     cause, count = Counter(causes).most_common(1)[0]
     mostly = "mostly " if count < len(missing) else ""
-    return f"{len(missing)} found no place, {mostly}{cause}"
+    why = cause.format(they_share="they share" if len(missing) > 1 else "it shares")
+    return f"{len(missing)} found no place, {mostly}because {why}"
 
 
 def _cause(photo: PhotoOutcome) -> str:
     why = photo.why_not or ""
     known = (words for reason, words in _CAUSES.items() if why.startswith(reason.value))
-    return next(known, f"because: {why}")
+    return next(known, "of this: " + why.replace("{", "{{").replace("}", "}}"))
 
 
 def _are_poor(missing: list[PhotoOutcome], summary: RunSummary) -> bool:

@@ -62,7 +62,7 @@ def test_the_summary_says_what_became_of_all():
         Skipped("e.jpg", SkipReason.TOO_SMALL, "20 x 20"),
     ]
     told = [
-        "2 of 3 photos are in one model; 1 found no place, because: no verified matches; "
+        "2 of 3 photos are in one model; 1 found no place, because of this: no verified matches; "
         "2 files were skipped (mostly empty file).",
         f"  {Path('out/sparse/0')}: 2 photos, 1234 points, 0.43 px",
         "skipped:",

@@ -34,7 +34,7 @@ def waiting_for(*reasons: str, of: int = 9) -> RunSummary:
             {"num_waiting": 2, "why_not": "it is dark"},
             None,
             Level.FAIR,
-            "7 of 9 photos are in one model; 2 found no place, because: it is dark.",
+            "7 of 9 photos are in one model; 2 found no place, because of this: it is dark.",
         ),
         (
             {"num_waiting": 0, "is_doubtful": True, "skipped": {"a": SkipReason.EMPTY_FILE}},
@@ -63,13 +63,13 @@ def test_the_likely_cause_is_that_of_most_photos():
     alone = WaitingReason.NO_MATCHES.value
     assert verdict(waiting_for(no_pose, other), None).sentence == (
         "7 of 9 photos are in one model; 2 found no place, "
-        "for too little in common with the photos in the model."
+        "because they share too little with the photos in the model."
     )
     found = verdict(waiting_for(alone, no_pose, alone, alone), None)
     assert found.level is Level.BAD
     assert found.sentence == (
         "Only 5 of 9 photos are in one model; 4 found no place, "
-        "mostly for too little overlap with any other photo."
+        "mostly because they share too little with any other photo."
     )
 
 
@@ -80,7 +80,7 @@ def test_photos_without_details_may_be_blurred():
         for photo in summary.used
     ]
     found = verdict(replace(summary, photos=tuple(photos)), None).sentence
-    assert "few details to go by, so they may be blurred or bare" in found
+    assert "because they share few details with any photo, as if blurred or bare" in found
 
 
 def test_several_models_are_said():
