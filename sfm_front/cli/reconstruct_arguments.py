@@ -101,7 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     photos.add_argument(
         "--quality",
         choices=("draft", "normal", "high"),
-        help="of photos as they are looked at: draft (800 px, 2000 features: about half the time, "
+        help="of photos as they are looked at: draft (800 px, 2000 features: mostly half the time, "
         "and photos with little overlap may find no place), normal (default), or high (2400 px, "
         "8000 features: more points). The next two win over it",
     )

@@ -11,7 +11,6 @@ from typing import TypeVar
 
 from sfm_front.errors import StorageError
 from sfm_front.events import (
-    FinishingBegan,
     FinishingStep,
     Listener,
     ModelEvent,
@@ -249,25 +248,28 @@ class Session(Closeable):
         self._finished = True
         clock = Stopwatch()
         with clock.stage("look again"):
-            self._begin(FinishingStep.LOOK_AGAIN)
+            self._announcer.begin(FinishingStep.LOOK_AGAIN)
             self._placing_more(self._parts.second_look.at_end)
         with clock.stage("finish"):
             self._placing_more(
                 lambda: finish(
-                    self._parts.atlas, self._parts.restart, self._georeference, self._begin
+                    self._parts.atlas,
+                    self._parts.restart,
+                    self._georeference,
+                    self._announcer.begin,
                 )
             )
             self._georeference()
             if self.options.control_points.file is not None:
-                self._begin(FinishingStep.CONTROL_POINTS)
+                self._announcer.begin(FinishingStep.CONTROL_POINTS)
             self._parts.control_points.hold(self._parts.atlas.models, self._parts.georeferencing)
-            self._begin(FinishingStep.CHECK)
+            self._announcer.begin(FinishingStep.CHECK)
             audits = [
                 audit(model.reconstruction, self._parts.view_graph)
                 for model in self._parts.atlas.models
             ]
         with clock.stage("export"):
-            self._begin(FinishingStep.WRITE)
+            self._announcer.begin(FinishingStep.WRITE)
             self.database.write_priors(self._parts.positions.checked().usable)
             positions = self._parts.georeferencing.outcome(
                 self._parts.atlas.models, self._parts.control_points.report
@@ -303,9 +305,6 @@ class Session(Closeable):
                     SessionEnded(False, len(self._parts.catalog), num_registered, num_models)
                 )
         self._opened.close()
-
-    def _begin(self, step: FinishingStep) -> None:
-        self._announcer.tell(FinishingBegan(step))
 
     def _georeference(self) -> None:
         self._parts.georeferencing.settle(self._parts.atlas.models)
