@@ -28,7 +28,7 @@ _FRUSTUM_PER_GAP = 0.6
 _FRUSTUM_PER_DIAGONAL = (0.01, 0.035)
 
 #: A frustum's edges between its five vertices: apex, then corners clockwise from the top left.
-_FRUSTUM_LINES = np.array(
+FRUSTUM_LINES = np.array(
     [[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]], dtype=np.int32
 )
 
@@ -120,9 +120,9 @@ def _part(model: pycolmap.Reconstruction, options: DrawOptions, up: Float64Array
         BACKGROUNDS[options.background][1],
     )
     points = np.array([point.xyz for point in seen]).reshape(-1, 3)
-    size = _frustum_size(points, centres)
+    size = frustum_size(points, centres)
     corners = [
-        centre + size * _frustum(model.cameras[image.camera_id]) @ rotation.T
+        centre + size * frustum(model.cameras[image.camera_id]) @ rotation.T
         for image, rotation, centre in zip(images, rotations, centres, strict=True)
     ]
     return _Part(points, colors, np.concatenate(corners), rotations, centres, legend)
@@ -140,8 +140,8 @@ def _drawn_lines(
         apexes = first + 5 * np.arange(count, dtype=np.int32)
         of_photo = sequence_colors(count)
         if options.frusta:
-            lines.append((apexes[:, None, None] + _FRUSTUM_LINES).reshape(-1, 2))
-            colors.append(np.repeat(of_photo, len(_FRUSTUM_LINES), axis=0))
+            lines.append((apexes[:, None, None] + FRUSTUM_LINES).reshape(-1, 2))
+            colors.append(np.repeat(of_photo, len(FRUSTUM_LINES), axis=0))
         if options.path:
             lines.append(np.stack([apexes[:-1], apexes[1:]], axis=1))
             colors.append(of_photo[:-1])
@@ -163,7 +163,7 @@ def _near_points(model: pycolmap.Reconstruction, centres: Float64Array) -> list[
     return [point for point, is_kept in zip(seen, kept, strict=True) if is_kept]
 
 
-def _frustum(camera: pycolmap.Camera) -> Float64Array:
+def frustum(camera: pycolmap.Camera) -> Float64Array:
     """(5, 3) in camera coordinates; its base has diagonal 1 at any focal length.
 
     Distortion and an off-centre principal point are not drawn.
@@ -174,7 +174,7 @@ def _frustum(camera: pycolmap.Camera) -> Float64Array:
     return np.array([[0, 0, 0], [-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]])
 
 
-def _frustum_size(points: Float64Array, centres: Float64Array) -> float:
+def frustum_size(points: Float64Array, centres: Float64Array) -> float:
     """Small compared to the scene, and such that neighbours in a sequence do not overlap."""
     everything = np.concatenate([points, centres])
     low, high = np.percentile(everything, _MIDDLE_PERCENTILES, axis=0)
