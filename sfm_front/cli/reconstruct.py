@@ -7,27 +7,23 @@ and it is placed in a model before the next one is taken.
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct_arguments import add_arguments as add_arguments
 from sfm_front.cli.reconstruct_arguments import session_options
+from sfm_front.cli.result import tell_nothing_to_do, tell_result
 from sfm_front.cli.signals import leaving_at_signal
-from sfm_front.cli.terminal import painted, printable
 from sfm_front.errors import InputError
 from sfm_front.events import Listener
 from sfm_front.photos.source import list_photos, order_photos
-from sfm_front.reports import html
-from sfm_front.reports.summary import closing_summary
 from sfm_front.reports.words import counted
 
 if TYPE_CHECKING:
-    from sfm_front.reports.run_summary import RunSummary
     from sfm_front.session.options import SessionOptions
     from sfm_front.types import NotYet, PhotoPath
 
@@ -73,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not (arguments.watch or overwrite) and nothing_to_do(
             output, options, folder, photos, append=append
         ):
-            _tell_nothing_to_do(arguments, output)
+            tell_nothing_to_do(arguments, output)
             return 0
         if not arguments.watch and (overwrite or not holds_session(output)):
             _check_control_points(options, photos)
@@ -114,60 +110,11 @@ def run(arguments: argparse.Namespace) -> int:
         progress.step("drawing the page")
         write_page(output)
         progress.close()
-        _tell_result(arguments, result.summary, output, spoken)
+        tell_result(arguments, result.summary, output, spoken)
         if not arguments.watch and taken < len(new):
             left = counted(len(new) - taken, "photo")
             print(f"stopped with {left} to go: the same command goes on from there", file=spoken)
     return 0 if result.models else 1
-
-
-def _tell_result(
-    arguments: argparse.Namespace, summary: RunSummary, output: Path, spoken: TextIO
-) -> None:
-    """In words, of which the first line is all that matters, or as JSON."""
-    from sfm_front.reports.verdict import verdict
-
-    if arguments.json:
-        _print_json(summary, output)
-    if arguments.json and arguments.quiet:
-        return
-    first, *details = closing_summary(
-        summary, output, watched=arguments.watch, with_stages=arguments.verbose > 0
-    ).splitlines()
-    level = verdict(summary, summary.sidecar).level
-    print(painted(printable(first), level, spoken), file=spoken)
-    if not arguments.quiet:
-        for line in (*details, *_next_steps(summary, output)):
-            print(printable(line), file=spoken)
-
-
-def _next_steps(summary: RunSummary, output: Path) -> list[str]:
-    """What to do with the result, to be copied."""
-    lines = [f"to look at: {output / html.FILE}"]
-    if summary.models:
-        folder = shlex.quote(str(output))
-        lines += [
-            f"            sfm-front view {folder}",
-            f"for other tools: sfm-front export {folder} --to nerfstudio",
-        ]
-    return lines
-
-
-def _tell_nothing_to_do(arguments: argparse.Namespace, output: Path) -> None:
-    from sfm_front.reports.report_json import read_report
-
-    if arguments.json:
-        _print_json(read_report(output), output)
-    else:
-        folder = arguments.folder
-        print(printable(f"{output}: finished, and holds all photos of {folder}: nothing to do"))
-
-
-def _print_json(summary: RunSummary, output: Path) -> None:
-    from sfm_front.reports.result_json import result
-    from sfm_front.storage.json_files import as_json
-
-    print(as_json(result(summary, output)))
 
 
 def _event_printer() -> Listener:
