@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import threading
 import time
 from contextlib import suppress
-from subprocess import PIPE, Popen
+from subprocess import DEVNULL, PIPE, Popen
 from typing import TextIO
 
 _ON_TERMINAL_S = 1.0
@@ -59,8 +60,7 @@ def _start(stream: TextIO) -> Popen[bytes] | None:
             [sys.executable, "-I", "-S", __file__, stream.encoding],
             stdin=PIPE,
             stdout=stream.fileno(),
-            # Ctrl-C is for the run; this one ends with it.
-            start_new_session=True,
+            stderr=DEVNULL,
         )
     except (OSError, ValueError):
         return None
@@ -73,6 +73,8 @@ def _clock(seconds: float) -> str:
 
 def _beat(encoding: str) -> None:
     """Until standard input ends."""
+    # Ctrl-C may ask the run to finish. Ctrl-Z stops both, for they are one job of the shell.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     on_terminal = os.isatty(1)
     every_s = _ON_TERMINAL_S if on_terminal else _ELSEWHERE_S
     ended, said = threading.Event(), threading.Event()
