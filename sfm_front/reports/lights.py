@@ -97,7 +97,10 @@ def focal_length(cameras: Sequence[CameraOutcome]) -> Light:
         level, words = Level.FAIR, f"{words}; the photos determine it"
     else:
         level = Level.BAD
-        doubt = f"its focal length is {change:.0%} from what EXIF says"
+        doubt = (
+            f"its focal length is {change:.0%} from what EXIF says, "
+            "and the photos do not determine it"
+        )
     return Light(level, name, f"{100 * change:.1f} %", words, doubt)
 
 
