@@ -98,8 +98,7 @@ def focal_length(cameras: Sequence[CameraOutcome]) -> Light:
     else:
         level = Level.BAD
         doubt = (
-            f"its focal length is {change:.0%} from what EXIF says, "
-            "and the photos do not determine it"
+            f"its focal length is {change:.0%} from what EXIF says and not determined by the photos"
         )
     return Light(level, name, f"{100 * change:.1f} %", words, doubt)
 
@@ -123,8 +122,17 @@ def positions(sidecar: Sidecar) -> Light:
         name,
         f"{residuals.median_m:.2g} m",
         f"median of {residuals.num_used} positions, CE90 {residuals.ce90_m:.2g} m{height}{wrong}",
-        sidecar.reasons[0] if sidecar.reasons else "",
+        _difference(sidecar),
     )
+
+
+def _difference(sidecar: Sidecar) -> str:
+    """Of a metric model and its positions, in short; empty if there is none."""
+    if not sidecar.reasons:
+        return ""
+    # Where the frame is held although positions no longer fix it, all that speaks against it.
+    is_long = ";" in sidecar.reasons[0]
+    return "positions no longer fix its place and scale" if is_long else sidecar.reasons[0]
 
 
 def control_points(report: ControlReport) -> Light:

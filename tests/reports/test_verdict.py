@@ -100,6 +100,8 @@ def test_what_makes_a_light_doubtful_is_said():
         "All 9 photos are in one model, in metres, "
         "but model and positions differ by 32 m in height."
     )
+    held = replace(SOUND, reasons=("the frame is held: …; the scale is uncertain",))
+    assert "but positions no longer fix its place" in verdict(summary, held).sentence
     none = replace(
         SOUND,
         state=GeoreferenceState.NONE,

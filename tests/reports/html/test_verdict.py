@@ -97,7 +97,7 @@ def test_where_the_photos_determine_it_exif_is_wrong():
         found = focal_length([camera(5, 1200, 1000, is_determined=unknown)])
         assert (found.level, found.doubt) == (
             Level.BAD,
-            "its focal length is 20% from what EXIF says, and the photos do not determine it",
+            "its focal length is 20% from what EXIF says and not determined by the photos",
         )
 
 
