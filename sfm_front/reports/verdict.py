@@ -41,9 +41,10 @@ def verdict(summary: RunSummary, sidecar: Sidecar | None) -> Verdict:
         return Verdict(Level.BAD, f"No model could be built{_why_no_model(summary)}.")
     registered, consistency = lights.photos(summary), lights.consistency(summary)
     doubts = [light.doubt for light in judged(summary, sidecar) if light.doubt]
-    if Level.BAD in (registered.level, consistency and consistency.level):
+    # One doubt may be EXIF's or the receiver's fault, two hardly.
+    if Level.BAD in (registered.level, consistency and consistency.level) or len(doubts) > 1:
         level = Level.BAD
-    elif doubts:  # Of what can be mended, as by other positions: the photos are where they are.
+    elif doubts:
         level = Level.FAIR
     else:
         level = registered.level

@@ -9,6 +9,7 @@ from helpers.report_making import METRIC, Output, summary_of
 
 from sfm_front.georeference.control.report import ControlReport
 from sfm_front.georeference.spread import GeoreferenceState
+from sfm_front.reports.camera_outcome import CameraOutcome
 from sfm_front.reports.lights import Level
 from sfm_front.reports.run_summary import RunSummary
 from sfm_front.reports.verdict import verdict
@@ -100,6 +101,19 @@ def test_what_makes_a_light_doubtful_is_said():
         "All 9 photos are in one model, in metres, "
         "but model and positions differ by 32 m in height."
     )
+    camera = CameraOutcome(
+        model_path="sparse/0",
+        camera_id=1,
+        num_photos=9,
+        lens="SIMPLE_PINHOLE",
+        params=(1300.0, 500.0, 400.0),
+        focal_px=1300.0,
+        prior_focal_px=1000.0,
+        focal_sigma=None,
+        is_determined=None,
+    )
+    assert verdict(replace(summary, cameras=(camera,)), SOUND).level is Level.FAIR
+    assert verdict(replace(summary, cameras=(camera,)), differs).level is Level.BAD
     held = replace(SOUND, reasons=("the frame is held: …; the scale is uncertain",))
     assert "but positions no longer fix its place" in verdict(summary, held).sentence
     none = replace(
