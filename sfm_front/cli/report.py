@@ -22,5 +22,5 @@ def run(arguments: argparse.Namespace) -> int:
     from sfm_front.reports.html.page import write_page
 
     file = write_page(arguments.output, arguments.photos)
-    print(f"wrote {file}: open it in a browser")
+    print(file if arguments.quiet else f"wrote {file}: open it in a browser")
     return 0
