@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.summary import closing_summary
 
 if TYPE_CHECKING:
+    from sfm_front.live_page.beside_session import PageBesideSession
     from sfm_front.session.options import SessionOptions
     from sfm_front.types import NotYet, PhotoPath
 
@@ -30,6 +32,11 @@ _STOPPING = "stopping: finishing with the photos taken so far; once more leaves 
 
 def run(arguments: argparse.Namespace) -> int:
     """Reconstruct, or print the options; 1 if no model could be built, else 0."""
+    with ExitStack() as opened:
+        return _run(arguments, opened)
+
+
+def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
     if arguments.print_config:
         from sfm_front.cli.config_file import as_toml
 
@@ -71,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
             _check_control_points(options, photos)
         progress = ProgressLine(sys.stderr if arguments.events else sys.stdout)
         on_event = _event_printer() if arguments.events else progress.show
+        page = _page(output, progress.note, opened) if arguments.viewer else None
         session = Session(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
         )
@@ -103,7 +111,15 @@ def run(arguments: argparse.Namespace) -> int:
         progress.end()
         progress.note(closing_summary(result.summary, output, watched=arguments.watch))
         progress.note(f"to look at: {write_page(output)}")
+    if page is not None:
+        page.stay()
     return 0 if result.models else 1
+
+
+def _page(output: Path, note: Callable[[str], None], opened: ExitStack) -> PageBesideSession:
+    from sfm_front.live_page.beside_session import PageBesideSession
+
+    return opened.enter_context(PageBesideSession(output, note))
 
 
 def _event_printer() -> Listener:

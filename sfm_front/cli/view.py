@@ -1,4 +1,7 @@
-"""Show a sparse model in a window, or save a picture of it."""
+"""Show a sparse model in a window or in a browser, or save a picture of it.
+
+In a browser a session is followed while it runs, also one of another process.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,16 @@ from sfm_front.viewers.options import BACKGROUNDS, DrawOptions
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``view`` on ``parser``."""
     defaults = DrawOptions()
-    parser.add_argument("model", type=Path, help="folder with a COLMAP model, binary or text")
+    parser.add_argument(
+        "model",
+        type=Path,
+        help="folder with a COLMAP model, binary or text; with --web also the output of a session",
+    )
+    parser.add_argument(
+        "--web",
+        action="store_true",
+        help="a page for browsers on this machine, which follows a session that runs",
+    )
     parser.add_argument(
         "--screenshot", type=Path, metavar="FILE.png", help="write a picture, without a screen"
     )
@@ -37,6 +49,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do what ``add_arguments`` parsed; the exit status."""
+    if args.web:
+        from sfm_front.live_page.viewing import serve
+
+        serve(args.model, print)
+        return 0
     options = DrawOptions(
         width=args.size[0],
         height=args.size[1],

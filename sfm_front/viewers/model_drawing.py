@@ -31,7 +31,7 @@ _SEQUENCE_COLORS = np.array(
 )
 
 #: A frustum's edges between its five vertices: apex, then corners clockwise from the top left.
-_FRUSTUM_LINES = np.array(
+FRUSTUM_LINES = np.array(
     [[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]], dtype=np.int32
 )
 
@@ -68,10 +68,10 @@ def build_scene(model: pycolmap.Reconstruction, options: DrawOptions | None = No
     centres = np.array([pose.translation for pose in world_from_cam])
 
     points, colors = _points(model, centres, BACKGROUNDS[options.background][1])
-    size = _frustum_size(points, centres)
+    size = frustum_size(points, centres)
     vertices = np.concatenate(
         [
-            centre + size * _frustum(model.cameras[image.camera_id]) @ rotation.T
+            centre + size * frustum(model.cameras[image.camera_id]) @ rotation.T
             for image, rotation, centre in zip(images, rotations, centres, strict=True)
         ]
     )
@@ -80,8 +80,8 @@ def build_scene(model: pycolmap.Reconstruction, options: DrawOptions | None = No
         points=points,
         point_colors=colors,
         vertices=vertices,
-        lines=(firsts[:, None, None] + _FRUSTUM_LINES).reshape(-1, 2),
-        line_colors=np.repeat(sequence_colors(len(images)), len(_FRUSTUM_LINES), axis=0),
+        lines=(firsts[:, None, None] + FRUSTUM_LINES).reshape(-1, 2),
+        line_colors=np.repeat(sequence_colors(len(images)), len(FRUSTUM_LINES), axis=0),
         point_size_px=options.point_size_px or _point_size(len(points), options),
         view=choose_view(points, vertices, rotations, centres, options.width / options.height),
     )
@@ -113,7 +113,7 @@ def _points(
     return points[kept], colors[kept]
 
 
-def _frustum(camera: pycolmap.Camera) -> Float64Array:
+def frustum(camera: pycolmap.Camera) -> Float64Array:
     """(5, 3) in camera coordinates; its base has diagonal 1 at any focal length.
 
     Distortion and an off-centre principal point are not drawn.
@@ -124,7 +124,7 @@ def _frustum(camera: pycolmap.Camera) -> Float64Array:
     return np.array([[0, 0, 0], [-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]])
 
 
-def _frustum_size(points: Float64Array, centres: Float64Array) -> float:
+def frustum_size(points: Float64Array, centres: Float64Array) -> float:
     """Small compared to the scene, and such that neighbours in a sequence do not overlap."""
     everything = np.concatenate([points, centres])
     low, high = np.percentile(everything, _MIDDLE_PERCENTILES, axis=0)
