@@ -56,6 +56,7 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
     overwrite, append = arguments.overwrite, arguments.append
     # Once more: pycolmap has put a handler of its own for SIGTERM in place.
     with leaving_at_signal(1):
+        from sfm_front.live_page.extra import scene_if_possible
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
         from sfm_front.reports.html.page import write_page
         from sfm_front.session.output_folder import holds_session
@@ -110,6 +111,8 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         result = session.finish()
         progress.end()
         progress.note(closing_summary(result.summary, output, watched=arguments.watch))
+        if scene := scene_if_possible(output):
+            progress.note(f"to turn in a browser: {scene}")
         progress.note(f"to look at: {write_page(output)}")
     if page is not None:
         page.stay()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 
-from sfm_front.errors import DependencyError
+from sfm_front.live_page.extra import check_installed
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.subprocess_env import module_environment
 
@@ -22,12 +21,6 @@ _ENDING_S = 2.0
 _STAYS = "the live page stays while a browser shows it; close it there, or press Ctrl-C"
 
 Note = Callable[[str], None]
-
-
-def check_installed() -> None:
-    """Raises DependencyError, in one line, if the page's library is not there."""
-    if importlib.util.find_spec("viser") is None:
-        raise DependencyError("the live page needs viser: pip install 'sfm-front[live]'")
 
 
 class PageBesideSession(Closeable):

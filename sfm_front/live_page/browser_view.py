@@ -30,13 +30,14 @@ class BrowserView:
         framed = scenery, camera.aspect
         if not scenery.cameras.names or (framed == self._framed and not anyway):
             return
+        is_same_window = self._framed is not None and self._framed[1] == camera.aspect
         self._framed = framed
         is_untouched = self._given is None or _distance(self._given, camera.position) < _SAME
         if not (is_untouched or anyway):
             return
         view = view_of(scenery, camera.aspect)
         reach = float(np.linalg.norm(view.eye - view.target))
-        if self._given is not None and not anyway:
+        if self._given is not None and is_same_window and not anyway:
             change = float(np.linalg.norm(view.eye - self._given)) / reach
             if change < _LEAST_CHANGE:
                 return
@@ -44,6 +45,14 @@ class BrowserView:
             camera.position, camera.look_at = view.eye, view.target
             camera.fov = np.radians(VERTICAL_FIELD_OF_VIEW_DEG)
         self._given = view.eye
+
+
+def set_first_view(server: viser.ViserServer, scenery: Scenery) -> None:
+    """Let browsers begin with, and come back to, the whole scene."""
+    if scenery.cameras.names:
+        view, first = view_of(scenery), server.initial_camera
+        first.position, first.look_at = view.eye, view.target
+        first.fov = np.radians(VERTICAL_FIELD_OF_VIEW_DEG)
 
 
 def _distance(one: Float64Array, two: Float64Array) -> float:

@@ -18,14 +18,15 @@ _GIVEN_UP = "its model was given up"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What became of a photo: its state, the place of its model among the models, and why it has
-    none. ``is_weak``: few other photos hold it."""
+    """What became of a photo: its state, the place of its model among the models, or why it has
+    none and what would help, where that is known. ``is_weak``: few other photos hold it."""
 
     photo: PhotoStory
     state: PhotoState
     model: int | None
-    reason: str
-    is_weak: bool
+    reason: str = ""
+    hint: str = ""
+    is_weak: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,14 +110,14 @@ class OutputFollower:
         if model is not None:
             linked = sum(in_model.get(name) == model for name in photo.links)
             is_weak = photo.image_id is not None and linked < self._story.few_pairs
-            return Outcome(photo, PhotoState.PLACED, model, "", is_weak)
+            return Outcome(photo, PhotoState.PLACED, model, is_weak=is_weak)
+        if photo.state is PhotoState.PLACED and photo.time > written:
+            # The models that hold it are still to be written.
+            return Outcome(photo, PhotoState.PLACED, None)
         hint = self._hints.get(photo.name, "")
         if photo.state is PhotoState.PLACED:
-            if photo.time > written:  # The models that hold it are still to be written.
-                return Outcome(photo, PhotoState.PLACED, None, "", False)
-            return Outcome(photo, PhotoState.WAITING, None, hint or _GIVEN_UP, False)
-        reason = "; ".join(filter(None, (photo.reason, hint)))
-        return Outcome(photo, photo.state, None, reason, False)
+            return Outcome(photo, PhotoState.WAITING, None, _GIVEN_UP, hint)
+        return Outcome(photo, photo.state, None, photo.reason, hint)
 
     def _read_hints(self) -> dict[str, str]:
         try:

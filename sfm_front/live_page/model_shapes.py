@@ -61,45 +61,52 @@ class ModelReader:
     def __init__(self, folder: Path) -> None:
         """``folder`` holds models, or is one."""
         self._folder = folder
-        self._seen: object = None
+        self._seen: tuple[int, ...] | None = None
 
     def new(self) -> Models | None:
         """The models, if they are others than at the last look and are whole; else None."""
-        found = self._state()
-        if found is None or found == self._seen:
+        version = self._version()
+        if version is None or version == self._seen:
             return None
-        content, written = found
         try:
+            content = _state(self._folder)
             if damaged_file(self._folder, content.get("files", {})) is not None:
                 return None
-            numbers_in_enu = _in_enu(self._folder)
+            in_enu = _in_enu(self._folder)
             shapes = [
-                _shape(read_model(folder), model_id, number in numbers_in_enu)
+                _shape(read_model(folder), model_id, number in in_enu)
                 for number, (folder, model_id) in enumerate(_folders(self._folder, content))
             ]
-        except (InputError, KeyError, TypeError, AttributeError):
+        except (InputError, OSError, ValueError, KeyError, TypeError, AttributeError):
             # Replaced meanwhile, most likely: there will be another look.
             return None
-        if self._state() != found:
+        if self._version() != version:
             return None
-        self._seen = found
+        self._seen = version
         shapes = [shape for shape in shapes if len(shape.image_ids)]
-        return Models(sorted(shapes, key=lambda shape: -len(shape.image_ids)), written)
+        shapes.sort(key=lambda shape: -len(shape.image_ids))
+        return Models(shapes, written=max(version) / 1e9)
 
-    def _state(self) -> tuple[dict[str, Any], float] | None:
-        """What the session says of its models, and when it was written."""
-        file = self._folder / STATE
+    def _version(self) -> tuple[int, ...] | None:
+        """When its files were written, in nanoseconds since 1970; None if there are none."""
+        state = self._folder / STATE
         try:
-            written = file.stat().st_mtime
-            content = json.loads(file.read_bytes())
-            return (content, written) if isinstance(content, dict) else None
-        except FileNotFoundError:
+            if state.exists():
+                return (state.stat().st_mtime_ns,)
             # Models of another program.
             files = [file for model in find_models(self._folder) for file in model.glob("*")]
-            newest = max((file.stat().st_mtime for file in files), default=None)
-            return None if newest is None else ({}, newest)
-        except (OSError, ValueError):
+            return tuple(sorted(file.stat().st_mtime_ns for file in files)) or None
+        except OSError:
             return None
+
+
+def _state(folder: Path) -> dict[str, Any]:
+    """What a session says of its models; empty if none wrote them."""
+    file = folder / STATE
+    content = json.loads(file.read_bytes()) if file.exists() else {}
+    if not isinstance(content, dict):
+        raise ValueError(f"{file} is not a session's")
+    return content
 
 
 def _folders(folder: Path, content: dict[str, Any]) -> list[tuple[Path, int]]:

@@ -23,7 +23,7 @@ _FACES = np.array(
 _LINE_PX = 1.5
 _LINK_PX = 2.0
 _FACE_OPACITY = 0.22
-_MARK_SIZE = 0.3
+_MARK_SIZE = 0.12
 
 
 class SceneDrawing:

@@ -98,8 +98,8 @@ class Scenery:
     ``model_ids``, the session's, and ``tops``, a place above it. ``newest``: its camera. ``links``
     (L, 2, 3): from the newest photo to those that it matches, ``proposals``: to others that
     retrieval named; ``weak_links``: of photos that few others hold; ``all_links``: every verified
-    pair. ``gaps`` (G, 3): cameras to whose photos others are most similar that wait, with
-    ``gap_counts``: how many."""
+    pair. ``gaps`` (G, 3): cameras whose photos match others that wait, with ``gap_counts``: how
+    many."""
 
     cameras: Cameras
     points: Float64Array
@@ -260,12 +260,11 @@ def _joined_segments(
 
 
 def _gaps(seen: Seen, at: dict[str, int]) -> dict[int, int]:
-    """Cameras that waiting photos are nearest to, and how many of them."""
+    """Cameras whose photos match best with photos that wait, and how many of those."""
     counts: dict[int, int] = {}
     for outcome in seen.named(PhotoState.WAITING):
-        photo = outcome.photo
-        linked = sorted(photo.links, key=lambda name: -photo.links[name])
-        nearest = next((at[name] for name in (*linked, *photo.similar) if name in at), None)
-        if nearest is not None:
-            counts[nearest] = counts.get(nearest, 0) + 1
+        links = {at[name]: count for name, count in outcome.photo.links.items() if name in at}
+        if links:
+            best = max(links, key=lambda place: links[place])
+            counts[best] = counts.get(best, 0) + 1
     return counts

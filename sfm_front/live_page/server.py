@@ -14,7 +14,7 @@ import viser
 
 from sfm_front.live_page.access import keep_private
 from sfm_front.live_page.beside_session import FIRST_PORT
-from sfm_front.live_page.browser_view import BrowserView
+from sfm_front.live_page.browser_view import BrowserView, set_first_view
 from sfm_front.live_page.follower import OutputFollower, Seen
 from sfm_front.live_page.panels import MainPanel, set_theme
 from sfm_front.live_page.photo_panel import PhotoPanel
@@ -101,12 +101,14 @@ class LivePage(Closeable):
 
     def close(self) -> None:
         unmark_watched(self._output)
-        self._server.stop()
+        with redirect_stdout(io.StringIO()):  # It says goodbye.
+            self._server.stop()
 
     def _show(self, seen: Seen, scenery: Scenery) -> None:
         with self._server.atomic():
             self._drawing.show(scenery)
             self._panel.show(seen)
+        set_first_view(self._server, scenery)
         for panel in list(self._photo_panels.values()):
             panel.show(seen, scenery)
 

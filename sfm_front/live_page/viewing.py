@@ -7,7 +7,9 @@ from pathlib import Path
 
 from sfm_front.errors import InputError
 from sfm_front.exporters.scene import output_of
-from sfm_front.live_page.beside_session import FIRST_PORT, Note, check_installed
+from sfm_front.live_page.beside_session import FIRST_PORT, Note
+from sfm_front.live_page.extra import check_installed
+from sfm_front.reports import event_log
 from sfm_front.storage.colmap_models import find_models
 
 
@@ -22,12 +24,13 @@ def serve(place: Path, note: Note, port: int = FIRST_PORT) -> None:
     if not place.is_dir():
         raise InputError(f"{place}: no such folder; give the output of a session, or a model")
     output = output_of(place)
-    from sfm_front.reports import event_log
-
     if not (output / event_log.FILE).is_file() and not find_models(output):
         raise InputError(f"{place}: holds no session and no model")
+    import pycolmap
+
     from sfm_front.live_page.server import LivePage
 
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
     with suppress(KeyboardInterrupt), LivePage(output, port) as page:
         note(f"{page.address} shows {output}; Ctrl-C ends it")
         page.run(lambda: False)

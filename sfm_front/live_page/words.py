@@ -224,21 +224,23 @@ def _row(seen: Seen, outcome: Outcome) -> Html:
 def _gap(outcome: Outcome, where: str) -> Html:
     return tag(
         "div",
-        tag("span", outcome.photo.name, style=_NAME, title=outcome.photo.name),
-        tag("span", where, style="flex:1"),
-        style=_ROW,
+        tag("div", outcome.photo.name, style="font-weight:600;overflow-wrap:anywhere"),
+        tag("div", where, style="overflow-wrap:anywhere;opacity:.85"),
+        style="padding:.3em 0;border-bottom:1px solid rgba(128,134,145,.18)",
     )
 
 
 def _near(outcome: Outcome) -> str:
     photo = outcome.photo
     linked = sorted(photo.links, key=lambda name: -photo.links[name])
-    if linked:
+    if outcome.hint:
+        near = outcome.hint
+    elif linked:
         near = f"matches {_listed(linked)}: take photos between"
     elif photo.similar:
-        near = f"matches none; most similar are {_listed(photo.similar)}"
+        near = f"most similar are {_listed(photo.similar)}"
     else:
-        near = "the first photo: nothing to match it with yet"
+        near = "nothing to match it with yet"
     return "; ".join(filter(None, (outcome.reason, near)))
 
 
