@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 import viser
 
@@ -12,39 +14,41 @@ from sfm_front.viewers.viewpoint import VERTICAL_FIELD_OF_VIEW_DEG
 
 # A view is changed if its eye moves by more than this share of its distance.
 _LEAST_CHANGE = 0.06
-# What a browser reports differs from what it was told by rounding.
-_SAME = 1e-3
+_ROUNDING = 1e-3
 
 
 class BrowserView:
     """One browser's camera."""
 
-    def __init__(self, client: viser.ClientHandle) -> None:
+    def __init__(self, client: viser.ClientHandle, first: Float64Array) -> None:
+        """``first`` (3,): where it began to look from."""
         self._client = client
-        self._given: Float64Array | None = None
+        # Where it was told to look from: elsewhere it is its user's choice.
+        self._told = deque([first, client.camera.position], maxlen=8)
         self._framed: tuple[Scenery, float] | None = None
 
     def follow(self, scenery: Scenery, *, anyway: bool = False) -> None:
         """Keep the whole scene in view, unless its user has moved; ``anyway``: even then."""
         camera = self._client.camera
-        framed = scenery, camera.aspect
-        if not scenery.cameras.names or (framed == self._framed and not anyway):
+        here, aspect = camera.position, camera.aspect
+        has_obeyed = _same(self._told[-1], here)
+        if not scenery.cameras.names or not (
+            anyway or any(_same(place, here) for place in self._told)
+        ):
             return
-        is_same_window = self._framed is not None and self._framed[1] == camera.aspect
-        self._framed = framed
-        is_untouched = self._given is None or _distance(self._given, camera.position) < _SAME
-        if not (is_untouched or anyway):
+        if (scenery, aspect) == self._framed and has_obeyed and not anyway:
             return
-        view = view_of(scenery, camera.aspect)
+        is_same_window = self._framed is not None and self._framed[1] == aspect
+        self._framed = scenery, aspect
+        view = view_of(scenery, aspect)
         reach = float(np.linalg.norm(view.eye - view.target))
-        if self._given is not None and is_same_window and not anyway:
-            change = float(np.linalg.norm(view.eye - self._given)) / reach
-            if change < _LEAST_CHANGE:
-                return
+        change = float(np.linalg.norm(view.eye - here)) / reach
+        if is_same_window and change < _LEAST_CHANGE and not anyway:
+            return
         with self._client.atomic():
             camera.position, camera.look_at = view.eye, view.target
             camera.fov = np.radians(VERTICAL_FIELD_OF_VIEW_DEG)
-        self._given = view.eye
+        self._told.append(view.eye)
 
 
 def set_first_view(server: viser.ViserServer, scenery: Scenery) -> None:
@@ -55,5 +59,7 @@ def set_first_view(server: viser.ViserServer, scenery: Scenery) -> None:
         first.fov = np.radians(VERTICAL_FIELD_OF_VIEW_DEG)
 
 
-def _distance(one: Float64Array, two: Float64Array) -> float:
-    return float(np.linalg.norm(one - two)) / max(float(np.linalg.norm(one)), 1e-9)
+def _same(one: Float64Array, two: Float64Array) -> bool:
+    """What a browser reports differs from what it was told by rounding."""
+    length = max(float(np.linalg.norm(one)), 1e-9)
+    return float(np.linalg.norm(one - two)) < _ROUNDING * length

@@ -114,12 +114,13 @@ class LivePage(Closeable):
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         panel = PhotoPanel(client, self._pictures)
+        view = BrowserView(client, self._server.initial_camera.position)
         with self._lock:
-            self._views[client.client_id] = BrowserView(client)
+            self._views[client.client_id] = view
             self._photo_panels[client.client_id] = panel
             if self._state is not None:
                 panel.show(*self._state)
-                self._views[client.client_id].follow(self._state[1])
+                view.follow(self._state[1])
 
     def _see_off(self, client: viser.ClientHandle) -> None:
         with self._lock:

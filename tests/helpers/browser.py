@@ -73,7 +73,7 @@ class Tab:
         while not what():
             assert time.monotonic() < until, "waited in vain"
             # Not asleep: the browser is listened to meanwhile.
-            self.page.wait_for_timeout(150)
+            self.page.wait_for_timeout(300)
 
     def close(self) -> None:
         self.page.context.close()

@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import http.client
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
-viser = pytest.importorskip("viser")
-
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
-
 from sfm_front.live_page.access import is_own
-from sfm_front.live_page.server import LivePage
+
+viser = pytest.importorskip("viser")
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory) -> Iterator[LivePage]:
+def page(tmp_path_factory) -> Iterator[Any]:
+    from sfm_front.live_page.server import LivePage
+
     with LivePage(tmp_path_factory.mktemp("empty"), 18180) as served:
         yield served
 
 
-def port_of(page: LivePage) -> int:
+def port_of(page: Any) -> int:
     return int(page.address.rpartition(":")[2])
 
 
-def get(page: LivePage, path: str) -> tuple[int, bytes]:
+def get(page: Any, path: str) -> tuple[int, bytes]:
     connection = http.client.HTTPConnection("127.0.0.1", port_of(page), timeout=10)
     connection.putrequest("GET", path, skip_host=False)
     connection.endheaders()
@@ -58,7 +57,7 @@ def test_it_listens_on_this_machine_alone(page):
 
 
 def test_another_page_takes_the_next_port(page, tmp_path):
-    with LivePage(tmp_path, port_of(page)) as other:
+    with type(page)(tmp_path, port_of(page)) as other:
         assert port_of(other) > port_of(page)
 
 
@@ -77,6 +76,9 @@ def test_the_page_is_served_and_nothing_else(page):
 
 
 def test_a_site_elsewhere_is_turned_away(page):
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
     protocol = f"viser-v{viser.__version__}"
     address = page.address.replace("http", "ws")
     with connect(address, origin="https://example.org", subprotocols=[protocol]) as socket:
