@@ -65,6 +65,7 @@ class OutputFollower:
         self._story = Story()
         self._models = Models([], 0.0)
         self._hints: dict[str, str] = {}
+        self._has_looked = False
 
     def look(self) -> Seen | None:
         """What is known now; None if nothing has changed since the last look."""
@@ -74,8 +75,9 @@ class OutputFollower:
         for event in events:
             self._story.tell(event)
         models = self._reader.new()
-        if models is None and not events and not is_anew:
+        if models is None and not events and not is_anew and self._has_looked:
             return None
+        self._has_looked = True
         self._models = models or self._models
         if self._story.ended:
             self._hints = self._read_hints()

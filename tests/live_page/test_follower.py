@@ -95,7 +95,7 @@ def test_nothing_new_is_nothing(tmp_path):
 def test_photos_are_seen_before_their_models_are_written(tmp_path):
     photos = photos_of(orbit(NUM_PHOTOS), tmp_path / "photos", has_positions=False)
     follower = OutputFollower(tmp_path / "out")
-    assert follower.look() is None
+    assert follower.look().outcomes == {}
     with Session(tmp_path / "out", options(snapshot_seconds=1e-9)) as session:
         for photo in photos:
             session.add_extracted(photo)
@@ -189,7 +189,7 @@ def test_models_that_are_being_replaced_are_looked_at_later(tmp_path):
     whole = images.read_bytes()
     images.write_bytes(whole[:-9])
     follower = OutputFollower(output)
-    assert follower.look() is None
+    assert follower.look().models == []
     images.write_bytes(whole)
     assert len(follower.look().models) == 1
     write_models(output, model_of(names(4)), model_of(names(2, "b")))
