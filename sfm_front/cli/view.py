@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     if args.web:
         from sfm_front.live_page.viewing import serve
 
-        serve(args.model, print)
+        serve(args.model, lambda line: print(line, flush=True))
         return 0
     options = DrawOptions(
         width=args.size[0],

@@ -37,7 +37,7 @@ class PhotoPanel:
         gui = client.gui
         panel = gui.add_panel()
         with panel.add_tab("Photo"):
-            self._list = gui.add_dropdown("photo", (_HINT,))
+            self._list = gui.add_dropdown("show", (_HINT,))
             self._picture = gui.add_image(_EMPTY, visible=False)
             self._through = gui.add_button("Look through it", visible=False)
             self._matches = gui.add_image(_EMPTY, visible=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from contextlib import suppress
 from pathlib import Path
 
@@ -32,5 +33,7 @@ def serve(place: Path, note: Note, port: int = FIRST_PORT) -> None:
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
     with suppress(KeyboardInterrupt), LivePage(output, port) as page:
+        # As Ctrl-C; pycolmap would write a page of its own.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         note(f"{page.address} shows {output}; Ctrl-C ends it")
         page.run(lambda: False)
