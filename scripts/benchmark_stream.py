@@ -41,6 +41,19 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--cache-mb", type=int, metavar="MB", help="memory for features of earlier photos"
     )
+    parser.add_argument(
+        "--gps-noise",
+        type=float,
+        metavar="METRES",
+        help="photos have positions, with this standard deviation along each axis",
+    )
+    parser.add_argument(
+        "--lens",
+        type=float,
+        nargs=3,
+        metavar=("K1", "P1", "P2"),
+        help="distortion of the camera, instead of a radial one of -0.03",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every photo's figures")
     return parser.parse_args(argv)
 
@@ -57,7 +70,14 @@ def run(args: argparse.Namespace) -> None:
     )
     with TemporaryDirectory(prefix="sfm_front_stream_") as output:
         result = run_stream(
-            args.photos, args.points, Path(output), options, seed=args.seed, note=tell
+            args.photos,
+            args.points,
+            Path(output),
+            options,
+            seed=args.seed,
+            note=tell,
+            gps_noise_m=args.gps_noise,
+            lens=tuple(args.lens) if args.lens else None,
         )
     print(format_result(result))
     if args.json:
@@ -101,7 +121,8 @@ def format_result(result: StreamResult) -> str:
         f"{_mib(result.peak_in_stream)} while they came, {_mib(result.memory.peak)} at all; "
         f"of that pycolmap's graph and models {_mib(result.memory.colmap)}",
         f"end of the session: {result.finish_seconds:.1f} s",
-        f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}",
+        f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}"
+        + ("" if result.bend_share is None else f"; bend {result.bend_share:.2%} of the extent"),
     ]
     return "\n".join(lines)
 

@@ -30,7 +30,7 @@ from sfm_front.evaluation.tuning.scene_arguments import (
 )
 from sfm_front.evaluation.tuning.table import format_sweep
 from sfm_front.evaluation.tuning.trials import Trials, counter, describe, num_photos, try_scene
-from sfm_front.reports.summary import clock
+from sfm_front.reports.words import clock
 from sfm_front.storage.json_files import write_json
 
 

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     )
     from sfm_front.events import Event, PhotoAdded
     from sfm_front.session.options import SessionOptions
-    from sfm_front.session.session import Session, SessionResult
+    from sfm_front.session.session import Session
+    from sfm_front.session.summing_up import SessionResult
     from sfm_front.types import ModelSummary, PhotoPath, Skipped
 
 __version__ = VERSION
@@ -55,7 +56,7 @@ _MODULES = {
     "PhotoPath": "types",
     "Session": "session.session",
     "SessionOptions": "session.options",
-    "SessionResult": "session.session",
+    "SessionResult": "session.summing_up",
     "SfmFrontError": "errors",
     "Skipped": "types",
     "WeightsError": "errors",

@@ -327,6 +327,25 @@ class PhotoWaiting:
     reason: str
 
 
+class FinishingStep(Enum):
+    """What a session is at once no more photos come; some take minutes for a long flight."""
+
+    LOOK_AGAIN = "matching poorly connected photos once more"
+    REFINE = "refining the models"
+    START_AFRESH = "looking for a better start, and a place for photos without one"
+    LAST_ADJUSTMENT = "last adjustment of all cameras and points"
+    CONTROL_POINTS = "fitting the model to control points"
+    CHECK = "checking the models"
+    WRITE = "writing the models"
+
+
+@dataclass(frozen=True, slots=True)
+class FinishingBegan:
+    """A step of the session's end begins."""
+
+    step: FinishingStep
+
+
 @dataclass(frozen=True, slots=True)
 class SessionEnded:
     """All models are written, or, if not ``finished``, those of the last snapshot stay."""
@@ -340,7 +359,7 @@ class SessionEnded:
 PhotoEvent: TypeAlias = (
     PhotoArrived | Skipped | PhotoDescribed | PhotoAdded | PhotoPlaced | PhotoWaiting
 )
-SessionEvent: TypeAlias = SessionStarted | SessionEnded
+SessionEvent: TypeAlias = SessionStarted | FinishingBegan | SessionEnded
 Event: TypeAlias = PhotoEvent | ModelEvent | SessionEvent
 """What a listener of a session hears of."""
 

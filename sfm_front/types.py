@@ -210,6 +210,14 @@ class RankedCandidate:
     matches: Uint32Array = field(repr=False, compare=False)
 
 
+class WaitingReason(Enum):
+    """How the words begin that say why a photo is in no model."""
+
+    NO_MATCHES = "no verified matches with any photo"
+    NEIGHBORS_WAIT = "verified matches only with photos that are not registered"
+    NO_POSE = "no pose fits"
+
+
 class Rejection(Enum):
     """Why two photos have no two-view geometry."""
 

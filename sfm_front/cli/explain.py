@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from dataclasses import asdict
 from pathlib import Path
 
+from sfm_front.cli.progress import LiveLine
+from sfm_front.cli.terminal import printable
 from sfm_front.errors import InputError
 
 
@@ -12,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``explain``."""
     parser.add_argument("output", type=Path, help="output of a finished reconstruction")
     parser.add_argument("photo", help="the photo's name, as in report.json")
+    parser.add_argument("--json", action="store_true", help="print all of it as one JSON object")
     parser.add_argument(
         "--draw",
         type=Path,
@@ -37,7 +42,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.draw is not None:
         check_picture(arguments.draw)
     explanation = explain(arguments.output, arguments.photo)
-    print(explanation)
+    if arguments.json:
+        from sfm_front.storage.json_files import as_json
+
+        print(as_json(asdict(explanation)))
+    else:
+        print(printable(str(explanation)))
     if arguments.draw is not None:
         verified = [c.name for c in explanation.candidates if c.num_verified is not None]
         others = [*verified, *(c.name for c in explanation.candidates), *explanation.others]
@@ -45,6 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
         if against is None:
             raise InputError(f"{arguments.photo}: nothing to draw, it has no candidates")
         _draw(arguments.output, arguments.photos, arguments.photo, against, arguments.draw)
+        # Standard output may go to a program that expects JSON.
+        LiveLine(sys.stderr, quiet=arguments.quiet).note(f"wrote {arguments.draw}")
     return 0 if explanation.model is not None else 1
 
 
@@ -72,4 +84,3 @@ def _draw(output: Path, photos: Path | None, name1: str, name2: str, file: Path)
         matches.is_inlier,
     )
     save(picture, file)
-    print(f"wrote {file}")

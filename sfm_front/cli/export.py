@@ -9,10 +9,12 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 from sfm_front.cli.progress import CountLine
 from sfm_front.cli.signals import leaving_at_signal
+from sfm_front.cli.terminal import printable
 from sfm_front.exporters.registry import TARGETS, export
 
 _EXIT_STATUS = """\
@@ -41,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model", type=int, metavar="N", help="model to export (default: the largest)"
     )
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
     photos = parser.add_argument_group("photos")
     photos.add_argument(
         "--images",
@@ -73,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
     threads = available_cores() if arguments.threads is None else arguments.threads
     options = ExportOptions(max_size_px=arguments.max_size, link=arguments.link, threads=threads)
-    progress = CountLine("photos", sys.stderr)
+    progress = CountLine("photo", sys.stderr, quiet=arguments.quiet)
     with leaving_at_signal(2, _STOPPING) as interrupted:
 
         def show(done: int, total: int) -> None:
@@ -93,8 +96,14 @@ def run(arguments: argparse.Namespace) -> int:
             )
         finally:
             progress.end()
-    print(f"{exported.folder}: {exported.num_photos} photos, {exported.num_points} points")
-    for note in exported.notes:
-        print(note)
-    print(f"next: {exported.next_step.format(folder=shlex.quote(str(exported.folder)))}")
+    next_step = exported.next_step.format(folder=shlex.quote(str(exported.folder)))
+    if arguments.json:
+        from sfm_front.storage.json_files import as_json
+
+        print(as_json({**asdict(exported), "next_step": next_step}))
+        return 0
+    lines = [f"{exported.folder}: {exported.num_photos} photos, {exported.num_points} points"]
+    if not arguments.quiet:
+        lines += [*exported.notes, f"next: {next_step}"]
+    print(printable("\n".join(lines)))
     return 0

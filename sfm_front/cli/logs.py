@@ -16,12 +16,16 @@ _LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
 
 def add_logging(parser: argparse.ArgumentParser) -> None:
     """Declare how much is told, and where."""
-    parser.add_argument(
+    how_much = parser.add_mutually_exclusive_group()
+    how_much.add_argument(
         "-v",
         "--verbose",
         action="count",
         default=0,
         help="tell more; twice: a line for each pair of photos",
+    )
+    how_much.add_argument(
+        "-q", "--quiet", action="store_true", help="tell only mistakes and the result"
     )
     parser.add_argument(
         "--log-file", type=Path, metavar="FILE", help="write everything that -vv would tell to FILE"

@@ -8,17 +8,19 @@ import warnings
 from collections.abc import Callable, Sequence
 
 from sfm_front import __version__
-from sfm_front.cli import explain, export, reconstruct, report, retrieve, view
+from sfm_front.cli import explain, export, guide, reconstruct, report, retrieve, view
+from sfm_front.cli.completion import add_completion
 from sfm_front.cli.logs import add_logging, logging_to
 from sfm_front.cli.signals import INTERRUPTED
 from sfm_front.cli.streams import unfailing_streams
+from sfm_front.cli.terminal import printable
 from sfm_front.errors import SfmFrontError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; the exit status. Mistakes of the user end in one line and status 2."""
     with unfailing_streams() as why_incomplete:
-        arguments = _parser().parse_args(argv)
+        arguments = make_parser().parse_args(argv)
         status = _run(arguments)
         lost = why_incomplete()
         if lost is not None:
@@ -29,11 +31,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     return status
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """That of all commands."""
     parser = argparse.ArgumentParser(
         prog="sfm-front", description="Structure-from-Motion that keeps up with the camera."
     )
     parser.add_argument("--version", action="version", version=__version__)
+    add_completion(parser)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add(commands, "reconstruct", "folder of photos → sparse models", reconstruct)
     _add(commands, "retrieve", "folder and photo → its most relevant photos", retrieve)
@@ -41,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     _add(commands, "export", "hand a model on to another tool", export)
     _add(commands, "report", "the page of a reconstruction, made anew", report)
     _add(commands, "explain", "why a photo was placed, or was not", explain)
+    _add(commands, "guide", "read a guide that ships with the package", guide)
     return parser
 
 
@@ -52,7 +57,7 @@ def _run(arguments: argparse.Namespace) -> int:
         with logging_to(arguments.verbose, arguments.log_file):
             return run(arguments)
     except SfmFrontError as error:
-        print(f"sfm-front {arguments.command}: {error}", file=sys.stderr)
+        print(printable(f"sfm-front {arguments.command}: {error}"), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)

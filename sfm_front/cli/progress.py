@@ -6,51 +6,66 @@ import shutil
 import time
 from typing import TextIO
 
-from sfm_front.events import ControlPointsRefused, Event, PhotoAdded
-from sfm_front.reports.summary import clock
+from sfm_front.cli.heartbeat import Heartbeat
+from sfm_front.cli.terminal import ERASE, is_terminal, printable
+from sfm_front.events import ControlPointsRefused, Event, FinishingBegan, PhotoAdded
+from sfm_front.reports.words import clock, counted
 from sfm_front.types import Skipped
 
 
 class LiveLine:
-    """A line that renews itself on a terminal; a line each time anywhere else."""
+    """A line that renews itself on a terminal; a line each time anywhere else.
 
-    def __init__(self, stream: TextIO) -> None:
+    ``quiet``: none of this.
+    """
+
+    def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
         self._stream = stream
-        self._live = stream.isatty()
+        self._live = is_terminal(stream)
+        self._quiet = quiet
 
     def note(self, text: str) -> None:
         """A line of its own, kept."""
-        self._erase()
-        print(text, file=self._stream, flush=True)
+        if not self._quiet:
+            self._print(text)
+
+    def keep(self, text: str) -> None:
+        """The same, however quiet it is."""
+        self._print(text)
 
     def end(self) -> None:
-        self._erase()
+        if self._live and not self._quiet:
+            self._stream.write(ERASE)
+            self._stream.flush()
 
-    def _write(self, text: str) -> None:
-        if not self._live:
-            print(text, file=self._stream, flush=True)
-            return
-        width = shutil.get_terminal_size().columns - 1
-        self._stream.write("\r\x1b[K" + text[:width])
+    def _print(self, text: str) -> None:
+        # At once: a heartbeat may write between two calls.
+        self._stream.write(f"{ERASE if self._live else ''}{printable(text)}\n")
         self._stream.flush()
 
-    def _erase(self) -> None:
-        if self._live:
-            self._stream.write("\r\x1b[K")
-            self._stream.flush()
+    def _write(self, text: str) -> None:
+        if self._quiet:
+            return
+        if not self._live:
+            self._print(text)
+            return
+        width = shutil.get_terminal_size().columns - 1
+        self._stream.write(ERASE + printable(text)[:width])
+        self._stream.flush()
 
 
 class ProgressLine(LiveLine):
-    """Where a reconstruction stands, photo by photo."""
+    """Where a reconstruction stands, photo by photo and in the steps of its end."""
 
-    def __init__(self, stream: TextIO) -> None:
-        super().__init__(stream)
+    def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
+        super().__init__(stream, quiet=quiet)
         self._total = 0
         self._started = time.perf_counter()
         self._done = 0
-        self._registered = 0
+        self._placed = 0
         self._points = 0
         self._is_finishing = False
+        self._heartbeat = Heartbeat(stream)
 
     def expect(self, total: int) -> None:
         """Time counts from now, to ``total`` photos."""
@@ -61,31 +76,44 @@ class ProgressLine(LiveLine):
         """Count a photo and show where things stand. Of other events only what can be mended while
         photos come is told; the closing summary has all."""
         if isinstance(event, ControlPointsRefused) and not self._is_finishing:
-            self.note(str(event))
+            self._print(str(event))
+        if isinstance(event, FinishingBegan):
+            self._is_finishing = True
+            self.step(event.step.value)
         if isinstance(event, Skipped):
             self.note(f"skipped {event.name}: {event}")
         elif isinstance(event, PhotoAdded):
-            self._registered, self._points = event.num_registered, event.num_points
+            self._placed, self._points = event.num_registered, event.num_points
         else:
             return
         self._done += 1
         # Nobody knows how many are still to come if a folder is watched.
-        of = f"/{self._total}  " if self._total else "  "
+        of = f" of {self._total}" if self._total else ""
         pace = f"  {_pace(self._started, self._done, self._total)}" if self._total else ""
         self._write(
-            f"photo {self._done}{of}registered {self._registered}  points {self._points}{pace}"
+            f"photo {self._done}{of}: {self._placed} placed, {counted(self._points, 'point')}{pace}"
         )
 
-    def finishing(self) -> None:
-        self._is_finishing = True
-        self._write("last refinement, then writing the models …")
+    def step(self, what: str) -> None:
+        """A step of the end begins."""
+        self._write(f"finishing: {what}", is_long=True)
+
+    def close(self) -> None:
+        """What is printed from here on is the last."""
+        self._heartbeat.stop()
+        self.end()
+
+    def _write(self, text: str, *, is_long: bool = False) -> None:
+        super()._write(text)
+        if not self._quiet:
+            self._heartbeat.say(printable(text), is_long=is_long)
 
 
 class CountLine(LiveLine):
     """How many photos are done; where there is no terminal, a line each tenth."""
 
-    def __init__(self, what: str, stream: TextIO) -> None:
-        super().__init__(stream)
+    def __init__(self, what: str, stream: TextIO, *, quiet: bool = False) -> None:
+        super().__init__(stream, quiet=quiet)
         self._what = what
         self._started = time.perf_counter()
 
@@ -93,9 +121,9 @@ class CountLine(LiveLine):
         """To be called after each photo."""
         tenths_before, tenths = (10 * n // total for n in (done - 1, done))
         if self._live or tenths > tenths_before:
-            self._write(f"{self._what} {done}/{total}  {_pace(self._started, done, total)}")
+            self._write(f"{self._what} {done} of {total}  {_pace(self._started, done, total)}")
 
 
 def _pace(started: float, done: int, total: int) -> str:
     seconds = (time.perf_counter() - started) / done
-    return f"{seconds:.2f} s per photo  {clock(seconds * (total - done))} left"
+    return f"{seconds:.2f} s a photo  {clock(seconds * (total - done))} left"

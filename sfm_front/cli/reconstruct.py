@@ -9,18 +9,19 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct_arguments import add_arguments as add_arguments
 from sfm_front.cli.reconstruct_arguments import session_options
+from sfm_front.cli.result import tell_nothing_to_do, tell_result
 from sfm_front.cli.signals import leaving_at_signal
 from sfm_front.errors import InputError
 from sfm_front.events import Listener
 from sfm_front.photos.source import list_photos, order_photos
-from sfm_front.reports.summary import closing_summary
+from sfm_front.reports.words import counted
 
 if TYPE_CHECKING:
     from sfm_front.live_page.beside_session import PageBesideSession
@@ -48,6 +49,8 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         arguments.usage_error("--idle-timeout goes with --watch")
     if arguments.order != "name" and arguments.watch:
         arguments.usage_error("--watch takes photos as they come: leave --order out")
+    if arguments.events and arguments.json:
+        arguments.usage_error("--events and --json both take standard output: leave one out")
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
@@ -73,21 +76,24 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         if not (arguments.watch or overwrite) and nothing_to_do(
             output, options, folder, photos, append=append
         ):
-            print(f"{output}: finished, and holds all photos of {folder}: nothing to do")
+            tell_nothing_to_do(arguments, output)
             return 0
         if not arguments.watch and (overwrite or not holds_session(output)):
             _check_control_points(options, photos)
-        progress = ProgressLine(sys.stderr if arguments.events else sys.stdout)
+        spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
+        progress = ProgressLine(spoken, quiet=arguments.quiet)
         on_event = _event_printer() if arguments.events else progress.show
-        page = _page(output, progress.note, opened) if arguments.viewer else None
+        # Also with --quiet: nobody finds the page without its address.
+        page = _page(output, progress.keep, opened) if arguments.viewer else None
         session = Session(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
         )
-    with session, leaving_at_signal(2, _STOPPING) as interrupted:
+    with session, closing(progress), leaving_at_signal(2, _STOPPING) as interrupted:
         for message in session.messages:
             progress.note(message)
         if session.num_restored:
             progress.note(f"continuing {output}: {session.num_restored} photos are in it")
+        new: list[PhotoPath] = []
         newcomers = Newcomers(session.database, folder, output, append=append)
         arriving: Iterable[PhotoPath | NotYet]
         if arguments.watch:
@@ -104,16 +110,20 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             new = list(newcomers.among(photos, progress.note))
             progress.expect(len(new))
             arriving = new
+        taken = 0
         for _ in session.add_all(arriving):
+            taken += 1
             if interrupted():
                 break
-        progress.finishing()
         result = session.finish()
-        progress.end()
-        progress.note(closing_summary(result.summary, output, watched=arguments.watch))
-        if scene := scene_if_possible(output):
-            progress.note(f"to turn in a browser: {scene}")
-        progress.note(f"to look at: {write_page(output)}")
+        progress.step("drawing the page")
+        scene_if_possible(output)
+        write_page(output)
+        progress.close()
+        tell_result(arguments, result.summary, output, spoken)
+        if not arguments.watch and taken < len(new):
+            left = counted(len(new) - taken, "photo")
+            print(f"stopped with {left} to go: the same command goes on from there", file=spoken)
     if page is not None:
         page.stay()
     return 0 if result.models else 1

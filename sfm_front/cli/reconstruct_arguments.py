@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,6 +77,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with -, print what happens as lines of JSON instead of the progress line",
     )
     parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print the result as one JSON object; all else goes to standard error",
+    )
+    parser.add_argument(
         "--text",
         action=argparse.BooleanOptionalAction,
         help="whether to write models as text too; photo names must not hold spaces then",
@@ -97,6 +102,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed",
         type=int,
         help="of --order random and of all RANSAC (default: 0)",
+    )
+    photos.add_argument(
+        "--quality",
+        choices=("draft", "normal", "high"),
+        help="of photos as they are looked at: draft (800 px, 2000 features: mostly half the time, "
+        "and photos with little overlap may find no place), normal (default), or high (2400 px, "
+        "8000 features: more points). The next two win over it",
     )
     shared.add_photos(photos)
     cameras = parser.add_argument_group("cameras")
@@ -165,9 +177,13 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
     """What was given on the command line; the rest is of ``--config``, or the default."""
     from sfm_front.cli.config_file import read_options
     from sfm_front.session.options import SessionOptions
+    from sfm_front.session.quality import QUALITIES
 
     base = SessionOptions() if arguments.config is None else read_options(arguments.config)
-    given = shared.given(arguments, base.retrieval)
+    given: dict[str, Any] = {}
+    if arguments.quality is not None:
+        given |= asdict(QUALITIES[arguments.quality])
+    given |= shared.given(arguments, base.retrieval)
     if arguments.num_matched is not None:
         given["pair_matching"] = replace(base.pair_matching, num_matched=arguments.num_matched)
     if arguments.text is not None:
@@ -195,7 +211,11 @@ def session_options(arguments: argparse.Namespace) -> SessionOptions:
         if len(size) != 2 or any(side % 1 != 0 or side < 1 for side in size):
             raise ConfigError(f"--gcp-size takes width and height, got {arguments.gcp_size!r}")
         control["marked_size"] = tuple(map(int, size))
-    given["control_points"] = replace(base.control_points, **control)
+    points = replace(base.control_points, **control)
+    if (control or points.marked_size is not None) and points.file is None:
+        flag = "--gcp-accuracy" if points.marked_size is None else "--gcp-size"
+        raise ConfigError(f"{flag} says how control points are: give them with --gcp FILE")
+    given["control_points"] = points
     return replace(base, **given)
 
 

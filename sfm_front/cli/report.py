@@ -23,8 +23,8 @@ def run(arguments: argparse.Namespace) -> int:
     from sfm_front.reports.html.page import write_page
 
     file = write_page(arguments.output, arguments.photos)
-    print(f"wrote {file}: open it in a browser")
+    print(file if arguments.quiet else f"wrote {file}: open it in a browser")
     scene = scene_if_possible(arguments.output)
-    if scene is not None:
+    if scene is not None and not arguments.quiet:
         print(f"wrote {scene}: the models to turn in a browser")
     return 0

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sfm_front.cli import arguments as shared
-from sfm_front.cli.progress import CountLine
+from sfm_front.cli.progress import CountLine, LiveLine
 from sfm_front.cli.reconstruct import default_output
+from sfm_front.cli.terminal import printable
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.photos.source import list_photos
 from sfm_front.types import ExtractedPhoto, PhotoPath, Skipped
@@ -101,18 +102,21 @@ def run(arguments: argparse.Namespace) -> int:
     _check_outputs(arguments)
     options, search_options = _options(arguments)
     device, on_device = usable_device(options.device)
+    # Apart from the answer, which may go through a pipe.
+    line = CountLine("indexing photo", sys.stderr, quiet=arguments.quiet)
     if on_device:
-        _note(on_device)
-    describer = _describer(options, location, device)
+        line.note(on_device)
+    describer = _describer(options, location, device, line)
     index = PhotoIndex(location, describer)
-    _update(index, photos, options.threads)
+    _update(index, photos, options.threads, line)
     described = [_describe(describer, query) for query in queries]
     with WorkerPool(options.threads) as workers:
         search = FolderSearch(index, search_options, workers, device=device)
         answers = [search.ask(query) for query in described]
-        _show(arguments, answers, photos)
-        if arguments.draw_matches is not None:
+        _show(arguments, answers, photos, line)
+        if arguments.draw_matches is not None and answers[0].found:
             _draw_matches(arguments.draw_matches, index, search, described[0], answers[0])
+            line.note(f"wrote {arguments.draw_matches}")
     return 0 if all(answer.found for answer in answers) else 1
 
 
@@ -153,7 +157,9 @@ def _options(arguments: argparse.Namespace) -> tuple[SessionOptions, SearchOptio
     return session, search
 
 
-def _describer(options: SessionOptions, location: Path, device: str) -> CachedExtraction:
+def _describer(
+    options: SessionOptions, location: Path, device: str, line: LiveLine
+) -> CachedExtraction:
     from sfm_front.features.cached_extraction import CachedExtraction
     from sfm_front.features.extraction import make_extractor
     from sfm_front.features.global_descriptors.descriptor import resolve
@@ -166,7 +172,7 @@ def _describer(options: SessionOptions, location: Path, device: str) -> CachedEx
         device=device,
     )
     if message:
-        _note(message)
+        line.note(message)
     return CachedExtraction(
         location,
         PhotoReader(max_image_size=options.max_image_size),
@@ -175,16 +181,15 @@ def _describer(options: SessionOptions, location: Path, device: str) -> CachedEx
     )
 
 
-def _update(index: PhotoIndex, photos: Sequence[PhotoPath], threads: int) -> None:
+def _update(index: PhotoIndex, photos: Sequence[PhotoPath], threads: int, line: CountLine) -> None:
     """Bring the index up to date and tell what that took."""
-    line = CountLine("indexing photo", sys.stderr)
     update = index.update(photos, num_threads=threads, progress=line.show)
     line.end()
-    _note(str(update))
+    line.note(str(update))
     for skipped in update.skipped[:_MOST_SKIPPED_TOLD]:
-        _note(f"skipped {skipped.name}: {skipped}")
+        line.note(f"skipped {skipped.name}: {skipped}")
     if len(update.skipped) > _MOST_SKIPPED_TOLD:
-        _note(f"skipped {len(update.skipped) - _MOST_SKIPPED_TOLD} more")
+        line.note(f"skipped {len(update.skipped) - _MOST_SKIPPED_TOLD} more")
 
 
 def _describe(describer: CachedExtraction, query: PhotoPath) -> ExtractedPhoto:
@@ -195,7 +200,10 @@ def _describe(describer: CachedExtraction, query: PhotoPath) -> ExtractedPhoto:
 
 
 def _show(
-    arguments: argparse.Namespace, answers: Sequence[Answer], photos: Sequence[PhotoPath]
+    arguments: argparse.Namespace,
+    answers: Sequence[Answer],
+    photos: Sequence[PhotoPath],
+    line: LiveLine,
 ) -> None:
     from sfm_front.cli import retrieve_output
     from sfm_front.search.ground_truth import read_ground_truth
@@ -206,23 +214,23 @@ def _show(
         truth = read_ground_truth(arguments.ground_truth, [photo.name for photo in photos])
         relevant = [truth.of(answer.query.name) for answer in answers]
     if arguments.json is not None:
-        _write_rows(retrieve_output.rows(answers), arguments.json)
+        _write_rows(retrieve_output.rows(answers), arguments.json, line)
     if arguments.json != _STANDARD_OUTPUT:
         for answer, names in zip(answers, relevant, strict=True):
-            print(retrieve_output.table(answer, names, arguments.top))
+            print(printable(retrieve_output.table(answer, names, arguments.top)))
     if arguments.sheet is not None:
         pictures.save(retrieve_output.sheet(answers, relevant), arguments.sheet)
-        _note(f"wrote {arguments.sheet}")
+        line.note(f"wrote {arguments.sheet}")
 
 
-def _write_rows(rows: Sequence[object], file: Path) -> None:
+def _write_rows(rows: Sequence[object], file: Path, line: LiveLine) -> None:
     from sfm_front.storage.json_files import as_json, write_json
 
     if file == _STANDARD_OUTPUT:
         print(as_json(rows))
         return
     write_json(file, rows)
-    _note(f"wrote {file}")
+    line.note(f"wrote {file}")
 
 
 def _draw_matches(
@@ -231,14 +239,6 @@ def _draw_matches(
     from sfm_front.cli import retrieve_output
     from sfm_front.viewers import pictures
 
-    if not answer.found:
-        return
     best = index.described(answer.found[0].image_id).photo
     matches = search.verified_matches(query, best)
     pictures.save(retrieve_output.matches_picture(query, best, matches), file)
-    _note(f"wrote {file}")
-
-
-def _note(text: str) -> None:
-    """Apart from the answer, which may go through a pipe."""
-    print(text, file=sys.stderr, flush=True)

@@ -1,26 +1,42 @@
-"""Show a sparse model in a window or in a browser, or save a picture of it.
+"""Show sparse models in a window, or save a picture of them.
 
-In a browser a session is followed while it runs, also one of another process.
+Of an output with several models all are shown: in their place where they are georeferenced, else
+side by side. Up is up: in east, north and up, or as the cameras tell. With --web, a page in the
+browser follows a session while it runs, also one of another process.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sfm_front import viewers
+from sfm_front.errors import InputError
+from sfm_front.storage.colmap_models import is_model
 from sfm_front.viewers.options import BACKGROUNDS, DrawOptions
+from sfm_front.viewers.point_colors import COLORINGS
+
+if TYPE_CHECKING:
+    from sfm_front.types import Float64Array
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``view`` on ``parser``."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     defaults = DrawOptions()
+    width = max(map(len, COLORINGS))
+    colorings = "".join(f"  {name:<{width}}  {says}\n" for name, says in COLORINGS.items())
+    parser.epilog = f"colours of points:\n{colorings}"
     parser.add_argument(
         "model",
         type=Path,
-        help="folder with a COLMAP model, binary or text; with --web also the output of a session",
+        metavar="OUTPUT|MODEL",
+        help="output of a reconstruction, or folder with a COLMAP model, binary or text",
     )
+    parser.add_argument("--model", type=int, metavar="N", dest="number", help="only sparse/N of it")
     parser.add_argument(
         "--web",
         action="store_true",
@@ -37,7 +53,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"of the window or picture, in pixels (default {defaults.width}x{defaults.height})",
     )
     parser.add_argument(
+        "--color-by",
+        choices=tuple(COLORINGS),
+        default=defaults.coloring,
+        help="what the colours of points say, see below (default %(default)s)",
+    )
+    parser.add_argument(
         "--point-size", type=float, metavar="PX", help="in pixels (default: follows the scene)"
+    )
+    parser.add_argument(
+        "--frusta",
+        action=argparse.BooleanOptionalAction,
+        default=defaults.frusta,
+        help="whether cameras are drawn",
+    )
+    parser.add_argument(
+        "--path", action="store_true", help="draw a line from each camera to the next"
     )
     parser.add_argument(
         "--background",
@@ -59,13 +90,50 @@ def run(args: argparse.Namespace) -> int:
         height=args.size[1],
         point_size_px=args.point_size,
         background=args.background,
+        coloring=args.color_by,
+        frusta=args.frusta,
+        path=args.path,
     )
+    models = _models(args.model, args.number)
     if args.screenshot is None:
-        viewers.view(args.model, options)
+        viewers.view(models, options, _common_up(models))
         return 0
-    viewers.screenshot(args.model, args.screenshot, options)
+    for legend in viewers.screenshot(models, args.screenshot, options, _common_up(models)):
+        print(legend)
     print(f"wrote {args.screenshot}")
     return 0
+
+
+def _models(place: Path, number: int | None) -> Sequence[Path]:
+    """The models at a place, or the one of a number; the place itself where there is none, of
+    which reading will say what is wrong."""
+    if is_model(place):
+        if number is not None:
+            raise InputError(f"{place} is one model: leave --model out, or give the output")
+        return [place]
+    sparse = place / "sparse"
+    found = [path for path in sparse.iterdir() if is_model(path)] if sparse.is_dir() else []
+    # As they are written, the largest first.
+    found.sort(key=lambda path: (len(path.name), path.name))
+    if number is None:
+        return found or [place]
+    picked = [path for path in found if path.name == str(number)]
+    if not picked:
+        names = ", ".join(path.name for path in found) or "none"
+        raise InputError(f"{place}: no model {number} in its sparse/, which has {names}")
+    return picked
+
+
+def _common_up(models: Sequence[Path]) -> Float64Array | None:
+    """That of east, north and up if all models are in it."""
+    from sfm_front.georeference.sidecar import FILE_NAME, read_sidecar
+    from sfm_front.viewers.side_by_side import UP
+
+    file = models[0].parent / FILE_NAME
+    if not file.is_file():
+        return None
+    in_enu = {str(number) for number in read_sidecar(file).models_in_enu}
+    return UP if {model.name for model in models} <= in_enu else None
 
 
 def _size(text: str) -> tuple[int, int]:

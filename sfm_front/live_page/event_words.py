@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sfm_front.reports.html.markup import counted
+from sfm_front.reports.words import counted
 
 Event = Mapping[str, Any]
 
@@ -63,6 +63,7 @@ def _georeferenced(event: Event) -> str:
 _WORDS: dict[str, Callable[[Event], str]] = {
     "session_started": _started,
     "session_ended": _ended,
+    "finishing_began": lambda e: f"finishing: {e['step']}",
     "model_started": lambda e: f"model {e['model_id']} {e['kind']}",
     "model_refined": _refined,
     "model_dropped": lambda e: f"model {e['model_id']} dropped: {e['reason']}",

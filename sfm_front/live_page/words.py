@@ -11,8 +11,8 @@ from collections.abc import Iterable, Sequence
 from sfm_front.live_page import palette
 from sfm_front.live_page.follower import Outcome, Seen
 from sfm_front.live_page.story import PhotoState
-from sfm_front.reports.html.markup import Html, counted, joined, tag
-from sfm_front.reports.summary import clock
+from sfm_front.reports.html.markup import Html, joined, tag
+from sfm_front.reports.words import clock, counted
 
 # Rows of a list; more would take a browser longer than a second to lay out.
 _MOST_ROWS = 300

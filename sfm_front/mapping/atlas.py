@@ -25,7 +25,7 @@ from sfm_front.mapping.lookalikes import FoldOptions
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import Model, ModelState
 from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.types import PairGeometry, View
+from sfm_front.types import PairGeometry, View, WaitingReason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,11 +143,11 @@ class Atlas:
         """What keeps a waiting photo out of the models, in words."""
         neighbors = self.view_graph.neighbors(image_id).keys()
         if not neighbors:
-            return "no verified matches with any photo"
+            return WaitingReason.NO_MATCHES.value
         if not neighbors & self.registered:
-            return "verified matches only with photos that are not registered"
+            return WaitingReason.NEIGHBORS_WAIT.value
         seen = max(model.num_visible_points(image_id) for model in self.models)
-        return f"no pose fits the {seen} model points it sees"
+        return f"{WaitingReason.NO_POSE.value} the {seen} model points it sees"
 
     def add(self, image_id: int) -> list[int]:
         """Take in a photo of the view graph and place all that can be placed.

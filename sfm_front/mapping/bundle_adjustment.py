@@ -13,6 +13,8 @@ from sfm_front.mapping.refinement_schedule import LARGE
 
 # In one model.
 _MOST_PHOTOS = 1_000_000
+# Up to so many photos, most of which see something in common, the matrix is taken as dense.
+_DENSE_UP_TO = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +26,7 @@ class RobustAdjustmentOptions:
     # Relative change of the cost at which it stops, and that for large models: long flights stay
     # bent with the looser one (TUNING: robust-tolerance).
     tolerance: float = 1e-4
-    large_tolerance: float = 1e-6
+    large_tolerance: float = 1e-7
     # Whether focal length and distortion may move, and the principal point of an unknown camera.
     refine_intrinsics: bool = True
     num_threads: int = 2
@@ -76,6 +78,7 @@ def solved_directly(
     """The options given, without what COLMAP does with more than a thousand photos: it solves by
     conjugate gradients, which hardly move what has to be unbent. Photos that follow each other
     make a matrix so sparse that it is factorized in no time (TUNING: direct-solver)."""
+    adjustment.ceres.max_num_images_direct_dense_cpu_solver = _DENSE_UP_TO
     adjustment.ceres.max_num_images_direct_sparse_cpu_solver = _MOST_PHOTOS
     adjustment.print_summary = False
     return adjustment

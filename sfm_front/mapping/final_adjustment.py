@@ -14,16 +14,19 @@ def final_adjustment(
     options: RobustAdjustmentOptions,
     calibration: CalibrationOptions | None = None,
 ) -> GrownModel:
-    """The model after a bundle adjustment with a robust loss; the one given is changed as well.
+    """The model after a bundle adjustment with a robust loss; the one given may change as well.
 
-    COLMAP ends with plain least squares, which wrong matches dominate (TUNING: robust-loss).
+    It has been adjusted so on some of its points. COLMAP ends with plain least squares, which
+    wrong matches dominate (TUNING: robust-loss).
 
     While it grew, its cameras had simple lenses, with the principal point in the middle: richer
-    ones, before there are photos enough, diverge. Now they get what the photos bear out. Finally
-    points that do not fit are dropped: the robust loss leaves them unconstrained.
+    ones, before there are photos enough, diverge. Now they get what the photos bear out, which
+    adjusts them; else it is done here. Finally points that do not fit are dropped: the robust loss
+    leaves them unconstrained.
     """
-    adjust_robustly(reconstruction, options, principal_point=False)
     grown = with_grown_lenses(reconstruction, calibration or CalibrationOptions(), options)
+    if grown.reconstruction is reconstruction:
+        adjust_robustly(reconstruction, options, principal_point=False)
     drop_misfits(grown.reconstruction)
     return grown
 

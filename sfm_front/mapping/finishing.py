@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from sfm_front.events import DropReason, RegisteredStructureLess, StartKind
+from sfm_front.events import DropReason, FinishingStep, RegisteredStructureLess, StartKind
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.initialization import Initializer
 from sfm_front.mapping.model import Model
@@ -17,26 +17,36 @@ def finish(
     atlas: Atlas,
     restart: Restart | None = None,
     before_last: Callable[[], None] = lambda: None,
+    on_step: Callable[[FinishingStep], None] = lambda _step: None,
 ) -> None:
     """Retry what waits, restart where the stream began badly, refine everything.
 
     ``restart``: the one that may be under way. ``before_last`` is called before the last adjustment
-    of the models. They cannot grow any more after this.
+    of the models, ``on_step`` with each step when it begins. They cannot grow any more after this.
     """
-    _Finishing(atlas, restart or Restart(atlas), before_last).run()
+    _Finishing(atlas, restart or Restart(atlas), before_last, on_step).run()
 
 
 class _Finishing:
-    def __init__(self, atlas: Atlas, restart: Restart, before_last: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        atlas: Atlas,
+        restart: Restart,
+        before_last: Callable[[], None],
+        on_step: Callable[[FinishingStep], None],
+    ) -> None:
         self._atlas = atlas
         self._before_last = before_last
+        self._on_step = on_step
         self._view_graph = atlas.view_graph
         self._options = atlas.options
         self._initializer = atlas.initializer
         self._restart = restart
 
     def run(self) -> None:
+        self._on_step(FinishingStep.REFINE)
         self._atlas.refine_until_stable()
+        self._on_step(FinishingStep.START_AFRESH)
         while self._restart.go_on():
             pass
         self._start_remaining()
@@ -53,6 +63,7 @@ class _Finishing:
         for model in self._atlas.models:
             model.leave_refinement()
         self._before_last()
+        self._on_step(FinishingStep.LAST_ADJUSTMENT)
         for model in self._atlas.models:
             model.finish()
         self._drop_without_pairs()

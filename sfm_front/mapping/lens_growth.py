@@ -58,7 +58,9 @@ def with_grown_lenses(
     options: CalibrationOptions,
     adjustment: RobustAdjustmentOptions,
 ) -> GrownModel:
-    """A model that has been adjusted, with richer lenses where they are better, or as it is.
+    """A model with richer lenses where they are better, adjusted with them, or the one given.
+
+    That one has been adjusted, on some of its points at least, and its errors are up to date.
 
     First it is computed what each lens would explain of the residuals, poses and points moving
     along: a fraction of what an adjustment takes. Tangential distortion and a principal point off

@@ -68,6 +68,8 @@ class ConvergenceOptions:
     # the same model; with 1e-5 a long flight stays bent (TUNING: final-tolerance).
     final_tolerance: float = 1e-5
     large_final_tolerance: float = 1e-6
+    # That from which the robust adjustment of a model that is not large goes on, at the end.
+    last_tolerance: float = 3e-5
 
     def __post_init__(self) -> None:
         for name in vars(self):
@@ -133,6 +135,15 @@ class MapperOptions:
         options.mapper.ba_global_prune_points_min_coverage_gain = self.min_coverage_gain
         options.mapper.abs_pose_refine_focal_length = self.refine_intrinsics
         options.mapper.abs_pose_refine_extra_params = self.refine_intrinsics
+        return options
+
+    def last(self, num_photos: int) -> pycolmap.IncrementalPipelineOptions:
+        """The same before the robust adjustment at the end: it need not converge
+        (TUNING: last-refinement)."""
+        options = self.final(num_photos)
+        options.ba_global_max_refinements = 1
+        if num_photos < self.schedule.large_from:
+            options.ba_global_function_tolerance = self.convergence.last_tolerance
         return options
 
     def streaming(self) -> pycolmap.IncrementalPipelineOptions:

@@ -291,11 +291,12 @@ class Model:
 
     def finish(self) -> None:
         """Refine a last time. The model cannot grow any more after this."""
-        self.refine()
+        self._refine(self._options.last(self.num_registered))
         # On fewer points first: most of the way is done in a fraction of the time.
         self._mapper.adjust_global_bundle(
             self._mapping, robust_adjustment(self._options.robust, self.num_registered)
         )
+        self.reconstruction.update_point_3d_errors()
         polished = final_adjustment(
             self.reconstruction, self._options.robust, self._options.calibration
         )

@@ -30,8 +30,13 @@ VERSION = 1
 
 def write_report(output: Path, summary: RunSummary) -> None:
     """Write ``report.json`` to the folder ``output``. Raises InputError if that fails."""
+    write_json(output / FILE, as_content(summary))
+
+
+def as_content(summary: RunSummary) -> dict[str, Any]:
+    """Ready for JSON."""
     totals = summary.totals
-    content = {
+    return {
         "version": VERSION,
         "photos": [_row(photo) for photo in summary.photos],
         "models": [
@@ -68,7 +73,6 @@ def write_report(output: Path, summary: RunSummary) -> None:
             "latency_seconds": _latency_row(totals.latency),
         },
     }
-    write_json(output / FILE, content)
 
 
 def read_report(output: Path) -> RunSummary:

@@ -150,10 +150,14 @@ class RunSummary:
     cameras: tuple[CameraOutcome, ...] = ()
 
     @property
+    def sidecar(self) -> Sidecar | None:
+        """Where the models stand on the earth; None where there are no positions."""
+        return self.georeference.sidecar if self.georeference else None
+
+    @property
     def control_points(self) -> ControlReport | None:
         """What became of them; None if none were given."""
-        sidecar = self.georeference and self.georeference.sidecar
-        return sidecar.control_points if sidecar else None
+        return self.sidecar.control_points if self.sidecar else None
 
     @property
     def used(self) -> list[PhotoOutcome]:

@@ -8,29 +8,31 @@ from pathlib import Path
 
 from sfm_front.reports.camera_outcome import camera_warnings
 from sfm_front.reports.control_words import control_lines
-from sfm_front.reports.run_summary import AuditOutcome, RunSummary
+from sfm_front.reports.run_summary import AuditOutcome, RunSummary, Totals
+from sfm_front.reports.words import clock, counted
 
 # Photos of a doubtful group; report.json names all.
 _MOST_NAMED = 5
 
 
-def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False) -> str:
-    """What a user reads at the end of a run that wrote to ``output``.
+def closing_summary(
+    summary: RunSummary, output: Path, *, watched: bool = False, with_stages: bool = False
+) -> str:
+    """What a user reads at the end of a run that wrote to ``output``: first of all the verdict.
 
     ``watched``: photos arrived one by one, so that their latency means something to the user.
+    ``with_stages``: whether to say how long each stage took.
     """
-    # Here, for it loads pycolmap, and the command line reads this file before it may be loaded.
+    # Here, for they load pycolmap, and the command line reads this file before it may be loaded.
     from sfm_front.reports.georeference_words import georeference_lines
+    from sfm_front.reports.verdict import verdict
 
     totals = summary.totals
-    lines = [
-        f"{totals.num_registered} of {totals.num_photos} photos registered in "
-        f"{_plural(len(summary.models), 'model')}, {clock(totals.wall_seconds)}"
-    ]
+    lines = [verdict(summary, summary.sidecar).sentence]
     for model in summary.models:
         lines.append(
-            f"  {output / model.path}: {model.num_registered} photos, "
-            f"{model.num_points} points, {model.mean_reprojection_error_px:.2f} px"
+            f"  {output / model.path}: {counted(model.num_registered, 'photo')}, "
+            f"{counted(model.num_points, 'point')}, {model.mean_reprojection_error_px:.2f} px"
         )
         if model.audit and model.audit.is_doubtful:
             lines.append(f"    {_doubt(model.audit)}")
@@ -39,26 +41,9 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
         lines += georeference_lines(summary.georeference)
     if summary.control_points is not None:
         lines += control_lines(summary.control_points)
-    photos = max(totals.num_photos, 1)
-    stages = ", ".join(
-        f"{stage} {seconds / photos:.3f}" for stage, seconds in totals.seconds_by_stage.items()
-    )
-    lines.append(f"per photo: {totals.wall_seconds / photos:.2f} s wall; stages overlap: {stages}")
-    by_quarter = totals.median_seconds_by_quarter
-    if len(by_quarter) == 4:
-        lines.append(
-            "work per photo without global refinement, median by quarter of the run: "
-            + ", ".join(f"{seconds:.2f} s" for seconds in by_quarter)
-        )
-    if watched and totals.latency:
-        latency = totals.latency
-        lines.append(
-            f"from arrival to pose: median {latency.median_s:.2f} s, "
-            f"95 % within {latency.p95_s:.2f} s, worst {latency.worst_s:.2f} s"
-        )
     lines += _reasons("skipped", [(photo.name, str(photo), "") for photo in summary.skipped])
     lines += _reasons(
-        "not registered",
+        "in no model",
         [
             (photo.name, photo.why_not or "", photo.hint)
             for photo in summary.used
@@ -68,9 +53,34 @@ def closing_summary(summary: RunSummary, output: Path, *, watched: bool = False)
     for groups in summary.look_alikes:
         first, second = map(_named, groups)
         lines.append(f"taken for one place and taken apart, look-alikes: {first} and {second}")
-    if not summary.models:
-        lines.append(_advice(summary))
+    photos = max(totals.num_photos, 1)
+    lines.append(
+        f"it took {clock(totals.wall_seconds)}, {totals.wall_seconds / photos:.2f} s a photo"
+    )
+    if watched and totals.latency:
+        latency = totals.latency
+        lines.append(
+            f"from arrival to pose: median {latency.median_s:.2f} s, "
+            f"95 % within {latency.p95_s:.2f} s, worst {latency.worst_s:.2f} s"
+        )
+    if with_stages:
+        lines += _stages(totals)
     return "\n".join(lines)
+
+
+def _stages(totals: Totals) -> list[str]:
+    photos = max(totals.num_photos, 1)
+    stages = ", ".join(
+        f"{stage} {seconds / photos:.3f}" for stage, seconds in totals.seconds_by_stage.items()
+    )
+    lines = [f"seconds a photo by stage, which overlap: {stages}"]
+    by_quarter = totals.median_seconds_by_quarter
+    if len(by_quarter) == 4:
+        lines.append(
+            "work per photo without global refinement, median by quarter of the run: "
+            + ", ".join(f"{seconds:.2f} s" for seconds in by_quarter)
+        )
+    return lines
 
 
 def _doubt(audit: AuditOutcome) -> str:
@@ -84,23 +94,6 @@ def _doubt(audit: AuditOutcome) -> str:
 
 def _named(names: Sequence[str]) -> str:
     return ", ".join(names[:_MOST_NAMED]) + (", ..." if len(names) > _MOST_NAMED else "")
-
-
-def _advice(summary: RunSummary) -> str:
-    if not summary.photos:
-        return "no model could be built: no photo came"
-    if not summary.used:
-        return "no model could be built: no photo could be read"
-    # Each but the first can have pairs with earlier photos.
-    if 2 * sum(photo.num_verified > 0 for photo in summary.used) >= len(summary.used):
-        return (
-            "no model could be built: the photos overlap, but the camera hardly moved between "
-            "them. Take each from another place; turning on the spot shows no depth"
-        )
-    return (
-        "no model could be built: take photos that overlap by two thirds and more, "
-        "from different places"
-    )
 
 
 def _reasons(what: str, rows: list[tuple[str, str, str]]) -> list[str]:
@@ -120,14 +113,3 @@ def _reasons(what: str, rows: list[tuple[str, str, str]]) -> list[str]:
         f"{what}: {len(rows)} photos (each in report.json)",
         *(f"  {count} × {why}" for why, count in counted),
     ]
-
-
-def _plural(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def clock(seconds: float) -> str:
-    """Minutes and seconds, or hours as well: 1:05, 2:00:07."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

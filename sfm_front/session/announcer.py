@@ -8,6 +8,8 @@ from pathlib import Path
 
 from sfm_front.events import (
     Event,
+    FinishingBegan,
+    FinishingStep,
     Listener,
     ModelEvent,
     PhotoArrived,
@@ -36,6 +38,10 @@ class Announcer:
         """An event of a photo or of the session."""
         for listener in self._listeners:
             listener(event)
+
+    def begin(self, step: FinishingStep) -> None:
+        """A step of the session's end begins."""
+        self.tell(FinishingBegan(step))
 
     def tell_of_model(self, event: ModelEvent) -> None:
         """An event of a model; it is kept for ``pop_model_events``, too."""

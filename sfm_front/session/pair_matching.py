@@ -14,7 +14,10 @@ from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
+from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.types import (
+    Candidate,
+    CandidateOutcome,
     PairGeometry,
     RankedCandidate,
     Rejected,
@@ -167,3 +170,23 @@ def _log(query: View, pairs: Sequence[PairGeometry], rejected: Mapping[int, Reje
         )
     for image_id, why in rejected.items():
         logger.debug("images %d and %d: %s", query.image_id, image_id, why)
+
+
+def candidate_outcomes(
+    candidates: Iterable[RankedCandidate | Candidate],
+    pairs: Iterable[PairGeometry],
+    rejected: Mapping[int, Rejected],
+    catalog: PhotoCatalog,
+) -> tuple[CandidateOutcome, ...]:
+    """What became of each candidate of a photo, in their order."""
+    verified = {pair.image_id2 for pair in pairs}
+    return tuple(
+        CandidateOutcome(
+            catalog.name(candidate.image_id),
+            candidate.cosine,
+            candidate.inliers,
+            candidate.image_id in verified,
+            rejected.get(candidate.image_id),
+        )
+        for candidate in candidates
+    )

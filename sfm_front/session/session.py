@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from sfm_front.errors import StorageError
 from sfm_front.events import (
+    FinishingStep,
     Listener,
     ModelEvent,
     ModelRefined,
@@ -28,7 +28,6 @@ from sfm_front.mapping.unfolding import unfold
 from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.report_json import write_report
 from sfm_front.reports.retrieval_log import RetrievalLog
-from sfm_front.reports.run_summary import RunSummary
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.stopwatch import Stopwatch
@@ -36,21 +35,19 @@ from sfm_front.session.announcer import Announcer
 from sfm_front.session.control_points import ControlPoints
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.output_folder import check_output_folder, open_output_folder
+from sfm_front.session.pair_matching import candidate_outcomes
 from sfm_front.session.parts import open_parts, restore
 from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.resume import as_dict, check_options, mark_finished, mark_running
 from sfm_front.session.snapshots import Snapshots, read_snapshot
-from sfm_front.session.summing_up import sum_up
+from sfm_front.session.summing_up import SessionResult, sum_up
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import (
-    Candidate,
-    CandidateOutcome,
     ExtractedPhoto,
     ModelSummary,
     NotYet,
     PairGeometry,
     PhotoPath,
-    RankedCandidate,
     Rejected,
     Rejection,
     Skipped,
@@ -63,14 +60,6 @@ Result = TypeVar("Result")
 _IDLE_AFTER_S = 2.0
 # A restart registers so many photos before it is asked again whether another one has come.
 _PHOTOS_AT_A_TIME = 2
-
-
-@dataclass(frozen=True, slots=True)
-class SessionResult:
-    """Finished models, the largest first, and what ``report.json`` says."""
-
-    models: tuple[ModelSummary, ...]
-    summary: RunSummary
 
 
 class Session(Closeable):
@@ -247,18 +236,28 @@ class Session(Closeable):
         self._finished = True
         clock = Stopwatch()
         with clock.stage("look again"):
+            self._announcer.begin(FinishingStep.LOOK_AGAIN)
             self._placing_more(self._parts.second_look.at_end)
         with clock.stage("finish"):
             self._placing_more(
-                lambda: finish(self._parts.atlas, self._parts.restart, self._georeference)
+                lambda: finish(
+                    self._parts.atlas,
+                    self._parts.restart,
+                    self._georeference,
+                    self._announcer.begin,
+                )
             )
             self._georeference()
+            if self.options.control_points.file is not None:
+                self._announcer.begin(FinishingStep.CONTROL_POINTS)
             self._parts.control_points.hold(self._parts.atlas.models, self._parts.georeferencing)
+            self._announcer.begin(FinishingStep.CHECK)
             audits = [
                 audit(model.reconstruction, self._parts.view_graph)
                 for model in self._parts.atlas.models
             ]
         with clock.stage("export"):
+            self._announcer.begin(FinishingStep.WRITE)
             self.database.write_priors(self._parts.positions.checked().usable)
             positions = self._parts.georeferencing.outcome(
                 self._parts.atlas.models, self._parts.control_points.report
@@ -346,7 +345,7 @@ class Session(Closeable):
             clock=clock,
         )
         unranked = candidates[len(ranked) :]
-        outcomes = self._outcomes([*ranked, *unranked], pairs, rejected)
+        outcomes = candidate_outcomes([*ranked, *unranked], pairs, rejected, parts.catalog)
         with clock.stage("store"):
             parts.control_points.take(photo.name, (photo.width, photo.height))
             prior = parts.positions.take(image_id, photo.name, photo.exif)
@@ -395,21 +394,3 @@ class Session(Closeable):
         self._retrieval_log.add(added)
         self._announcer.tell(added)
         self._announcer.tell_outcome(self._parts.atlas, added.image_id, registered)
-
-    def _outcomes(
-        self,
-        candidates: Iterable[RankedCandidate | Candidate],
-        pairs: Iterable[PairGeometry],
-        rejected: Mapping[int, Rejected],
-    ) -> tuple[CandidateOutcome, ...]:
-        verified = {pair.image_id2 for pair in pairs}
-        return tuple(
-            CandidateOutcome(
-                self._parts.catalog.name(candidate.image_id),
-                candidate.cosine,
-                candidate.inliers,
-                candidate.image_id in verified,
-                rejected.get(candidate.image_id),
-            )
-            for candidate in candidates
-        )

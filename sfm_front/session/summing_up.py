@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from sfm_front.events import ModelEvent
 from sfm_front.mapping.audit import ModelAudit
@@ -12,6 +13,14 @@ from sfm_front.session.hints import hint
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.parts import SessionParts
 from sfm_front.types import ModelSummary
+
+
+@dataclass(frozen=True, slots=True)
+class SessionResult:
+    """Finished models, the largest first, and what ``report.json`` says."""
+
+    models: tuple[ModelSummary, ...]
+    summary: RunSummary
 
 
 def sum_up(

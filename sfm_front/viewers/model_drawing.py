@@ -1,7 +1,8 @@
-"""A COLMAP model → what is drawn: coloured points, camera frusta, a view."""
+"""COLMAP models → what is drawn: coloured points, cameras and their path, a view."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from sfm_front.errors import InputError
 from sfm_front.types import Float64Array
 from sfm_front.viewers.options import BACKGROUNDS, DrawOptions
-from sfm_front.viewers.viewpoint import View, choose_view
+from sfm_front.viewers.point_colors import point_colors, sequence_colors
+from sfm_front.viewers.viewpoint import View, choose_view, upward
 
 if TYPE_CHECKING:
     import pycolmap
@@ -25,11 +27,6 @@ _MIDDLE_PERCENTILES = (1.0, 99.0)
 _FRUSTUM_PER_GAP = 0.6
 _FRUSTUM_PER_DIAGONAL = (0.01, 0.035)
 
-#: First photo to last: blue, teal, yellow, red; visible on dark and on white.
-_SEQUENCE_COLORS = np.array(
-    [[0.20, 0.47, 0.96], [0.06, 0.72, 0.65], [0.95, 0.70, 0.10], [0.93, 0.25, 0.22]]
-)
-
 #: A frustum's edges between its five vertices: apex, then corners clockwise from the top left.
 FRUSTUM_LINES = np.array(
     [[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]], dtype=np.int32
@@ -40,9 +37,10 @@ FRUSTUM_LINES = np.array(
 class Scene:
     """What is drawn, in world coordinates; colours are RGB in [0, 1].
 
-    ``points`` and ``point_colors`` are (N, 3) float64. The frusta of K cameras, in the order of
-    their photos: ``vertices`` (5 K, 3) float64, ``lines`` (8 K, 2) int32 indices into them,
-    ``line_colors`` (8 K, 3) float64.
+    ``points`` and ``point_colors`` are (N, 3) float64. Frusta of K cameras, in the order of their
+    photos, and what leads from one to the next: ``vertices`` (V, 3) float64, of which the first 5 K
+    are the frusta's, five each; ``lines`` (L, 2) int32 indices into them, ``line_colors`` (L, 3)
+    float64. ``legends``: what colours of points say, for each model where that is a quantity.
     """
 
     points: Float64Array
@@ -52,65 +50,117 @@ class Scene:
     line_colors: Float64Array
     point_size_px: float
     view: View
+    legends: tuple[str, ...] = ()
 
 
-def build_scene(model: pycolmap.Reconstruction, options: DrawOptions | None = None) -> Scene:
-    """Everything a viewer needs of ``model``.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """One model's share of a scene, and its cameras: ``rotations`` (K, 3, 3), world from camera,
+    and ``centres`` (K, 3)."""
 
-    Raises ``InputError`` if no photo of the model has a pose.
+    points: Float64Array
+    point_colors: Float64Array
+    frusta: Float64Array
+    rotations: Float64Array
+    centres: Float64Array
+    legend: str
+
+
+def build_scene(
+    models: pycolmap.Reconstruction | Sequence[pycolmap.Reconstruction],
+    options: DrawOptions | None = None,
+    up: Float64Array | None = None,
+) -> Scene:
+    """Everything a viewer needs of a model, or of several in one frame.
+
+    ``up`` (3,): upwards in their world, length 1; by default as the cameras tell. Raises
+    ``InputError`` if no photo of a model has a pose.
     """
     options = options or DrawOptions()
-    images = [model.images[image_id] for image_id in sorted(model.reg_image_ids())]
+    parts = [
+        _part(model, options, up)
+        for model in (models if isinstance(models, Sequence) else [models])
+    ]
+    points = np.concatenate([part.points for part in parts])
+    corners = np.concatenate([part.frusta for part in parts])
+    vertices, lines, line_colors = _drawn_lines(parts, options)
+    return Scene(
+        points=points,
+        point_colors=np.concatenate([part.point_colors for part in parts]),
+        vertices=vertices,
+        lines=lines,
+        line_colors=line_colors,
+        point_size_px=options.point_size_px or _point_size(len(points), options),
+        view=choose_view(
+            points,
+            corners,
+            np.concatenate([part.rotations for part in parts]),
+            np.concatenate([part.centres for part in parts]),
+            options.width / options.height,
+            up=up,
+        ),
+        legends=tuple(part.legend for part in parts if part.legend),
+    )
+
+
+def _part(model: pycolmap.Reconstruction, options: DrawOptions, up: Float64Array | None) -> _Part:
+    image_ids = sorted(model.reg_image_ids())
+    images = [model.images[image_id] for image_id in image_ids]
     if not images:
         raise InputError("the model holds no registered photo: there is nothing to draw")
     world_from_cam = [image.cam_from_world().inverse() for image in images]
     rotations = np.array([pose.rotation.matrix() for pose in world_from_cam])
     centres = np.array([pose.translation for pose in world_from_cam])
-
-    points, colors = _points(model, centres, BACKGROUNDS[options.background][1])
-    size = frustum_size(points, centres)
-    vertices = np.concatenate(
-        [
-            centre + size * frustum(model.cameras[image.camera_id]) @ rotation.T
-            for image, rotation, centre in zip(images, rotations, centres, strict=True)
-        ]
+    seen = _near_points(model, centres)
+    colors, legend = point_colors(
+        seen,
+        image_ids,
+        options.coloring,
+        upward(rotations, centres) if up is None else up,
+        BACKGROUNDS[options.background][1],
     )
-    firsts = 5 * np.arange(len(images), dtype=np.int32)
-    return Scene(
-        points=points,
-        point_colors=colors,
-        vertices=vertices,
-        lines=(firsts[:, None, None] + FRUSTUM_LINES).reshape(-1, 2),
-        line_colors=np.repeat(sequence_colors(len(images)), len(FRUSTUM_LINES), axis=0),
-        point_size_px=options.point_size_px or _point_size(len(points), options),
-        view=choose_view(points, vertices, rotations, centres, options.width / options.height),
-    )
-
-
-def sequence_colors(count: int) -> Float64Array:
-    """(count, 3) float64: one colour per photo, running through the sequence."""
-    stops = np.linspace(0.0, 1.0, len(_SEQUENCE_COLORS))
-    at = np.linspace(0.0, 1.0, count)
-    return np.stack([np.interp(at, stops, channel) for channel in _SEQUENCE_COLORS.T], axis=1)
-
-
-def _points(
-    model: pycolmap.Reconstruction, centres: Float64Array, grey: float
-) -> tuple[Float64Array, Float64Array]:
-    """Coordinates and colours without far outliers; ``grey`` if the model has no colours."""
-    seen = [point for _, point in sorted(model.points3D.items())]
     points = np.array([point.xyz for point in seen]).reshape(-1, 3)
-    colors = np.array([point.color for point in seen]).reshape(-1, 3) / 255.0
-    if not len(points):
-        return points, colors
+    size = frustum_size(points, centres)
+    corners = [
+        centre + size * frustum(model.cameras[image.camera_id]) @ rotation.T
+        for image, rotation, centre in zip(images, rotations, centres, strict=True)
+    ]
+    return _Part(points, colors, np.concatenate(corners), rotations, centres, legend)
+
+
+def _drawn_lines(
+    parts: Sequence[_Part], options: DrawOptions
+) -> tuple[Float64Array, NDArray[np.int32], Float64Array]:
+    """Vertices, lines and their colours, as a scene has them."""
+    vertices = np.concatenate([part.frusta for part in parts])
+    lines, colors = [np.zeros((0, 2), np.int32)], [np.zeros((0, 3))]
+    first = 0
+    for part in parts:
+        count = len(part.centres)
+        apexes = first + 5 * np.arange(count, dtype=np.int32)
+        of_photo = sequence_colors(count)
+        if options.frusta:
+            lines.append((apexes[:, None, None] + FRUSTUM_LINES).reshape(-1, 2))
+            colors.append(np.repeat(of_photo, len(FRUSTUM_LINES), axis=0))
+        if options.path:
+            lines.append(np.stack([apexes[:-1], apexes[1:]], axis=1))
+            colors.append(of_photo[:-1])
+        first += 5 * count
+    return vertices, np.concatenate(lines), np.concatenate(colors)
+
+
+def _near_points(model: pycolmap.Reconstruction, centres: Float64Array) -> list[pycolmap.Point3D]:
+    """Without far outliers."""
+    seen = [point for _, point in sorted(model.points3D.items())]
+    if not seen:
+        return seen
+    points = np.array([point.xyz for point in seen])
     low, high = np.percentile(points, _MIDDLE_PERCENTILES, axis=0)
     margin = _KEPT_EXTENTS * np.linalg.norm(high - low)
     low = np.minimum(low, centres.min(axis=0)) - margin
     high = np.maximum(high, centres.max(axis=0)) + margin
     kept = np.all((points >= low) & (points <= high), axis=1)
-    if not colors.any():
-        colors = np.full_like(points, grey)
-    return points[kept], colors[kept]
+    return [point for point, is_kept in zip(seen, kept, strict=True) if is_kept]
 
 
 def frustum(camera: pycolmap.Camera) -> Float64Array:

@@ -50,14 +50,16 @@ def _render(o3d: Any, arrays: dict[str, Any]) -> Any:
         material.point_size = float(arrays["point_size_px"]) * _OVERSAMPLING
         scene.add_geometry("points", cloud, material)
 
-    frusta = o3d.geometry.LineSet(
-        o3d.utility.Vector3dVector(arrays["vertices"]), o3d.utility.Vector2iVector(arrays["lines"])
-    )
-    frusta.colors = o3d.utility.Vector3dVector(arrays["line_colors"])
-    material = o3d.visualization.rendering.MaterialRecord()
-    material.shader = "unlitLine"
-    material.line_width = _LINE_WIDTH_PX * _OVERSAMPLING
-    scene.add_geometry("frusta", frusta, material)
+    if len(arrays["lines"]):
+        lines = o3d.geometry.LineSet(
+            o3d.utility.Vector3dVector(arrays["vertices"]),
+            o3d.utility.Vector2iVector(arrays["lines"]),
+        )
+        lines.colors = o3d.utility.Vector3dVector(arrays["line_colors"])
+        material = o3d.visualization.rendering.MaterialRecord()
+        material.shader = "unlitLine"
+        material.line_width = _LINE_WIDTH_PX * _OVERSAMPLING
+        scene.add_geometry("cameras", lines, material)
 
     renderer.setup_camera(
         float(arrays["field_of_view_deg"]), arrays["target"], arrays["eye"], arrays["up"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,14 +26,19 @@ def show(scene: Scene, options: DrawOptions, title: str) -> None:
     if not _has_screen():
         raise DependencyError("no screen to open a window on; use --screenshot FILE.png instead")
     o3d = load_open3d()
-    window = o3d.visualization.Visualizer()
+    window = o3d.visualization.VisualizerWithKeyCallback()
+    title = f"{title} (C: cameras on and off, + and -: size of points, H: all keys)"
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         opened = window.create_window(title, width=options.width, height=options.height)
     if not opened:
         raise DependencyError("open3d cannot open a window; use --screenshot FILE.png instead")
     try:
-        for geometry in _geometries(o3d, scene):
-            window.add_geometry(geometry)
+        points, cameras = _points(o3d, scene), _cameras(o3d, scene)
+        for geometry in (points, cameras):
+            if geometry is not None:
+                window.add_geometry(geometry)
+        if cameras is not None:
+            window.register_key_callback(ord("C"), _toggle(cameras))
         drawing = window.get_render_option()
         drawing.background_color = np.array(BACKGROUNDS[options.background][0])
         drawing.point_size = scene.point_size_px
@@ -60,15 +66,38 @@ def _has_screen() -> bool:
     return True
 
 
-def _geometries(o3d: Any, scene: Scene) -> list[Any]:
-    geometry, utility = o3d.geometry, o3d.utility
-    cloud = geometry.PointCloud(utility.Vector3dVector(scene.points))
-    cloud.colors = utility.Vector3dVector(scene.point_colors)
-    frusta = geometry.LineSet(
-        utility.Vector3dVector(scene.vertices), utility.Vector2iVector(scene.lines)
+def _points(o3d: Any, scene: Scene) -> Any:
+    """None without any."""
+    if not len(scene.points):
+        return None
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(scene.points))
+    cloud.colors = o3d.utility.Vector3dVector(scene.point_colors)
+    return cloud
+
+
+def _cameras(o3d: Any, scene: Scene) -> Any:
+    """Frusta and path; None without any."""
+    if not len(scene.lines):
+        return None
+    lines = o3d.geometry.LineSet(
+        o3d.utility.Vector3dVector(scene.vertices), o3d.utility.Vector2iVector(scene.lines)
     )
-    frusta.colors = utility.Vector3dVector(scene.line_colors)
-    return [cloud, frusta] if len(scene.points) else [frusta]
+    lines.colors = o3d.utility.Vector3dVector(scene.line_colors)
+    return lines
+
+
+def _toggle(geometry: Any) -> Callable[[Any], bool]:
+    """For a key: takes a geometry that is shown out of a window, and back into it."""
+    is_shown = True
+
+    def act(window: Any) -> bool:
+        nonlocal is_shown
+        change = window.remove_geometry if is_shown else window.add_geometry
+        change(geometry, reset_bounding_box=False)
+        is_shown = not is_shown
+        return True
+
+    return act
 
 
 def _pinhole(o3d: Any, view: View, options: DrawOptions) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
+from sfm_front.viewers.point_colors import COLORINGS
 
 #: Background colour, and the grey of points if the model has no colours.
 BACKGROUNDS: dict[str, tuple[tuple[float, float, float], float]] = {
@@ -19,13 +20,18 @@ _LARGEST_POINT_PX = 50.0
 @dataclass(frozen=True, kw_only=True)
 class DrawOptions:
     """Size of the picture and of its points in pixels; by default the number of points sets
-    ``point_size_px``. ``background`` is a key of ``BACKGROUNDS``, whose colours are RGB in [0, 1].
+    ``point_size_px``. ``background`` is a key of ``BACKGROUNDS``, whose colours are RGB in [0, 1],
+    ``coloring`` of points one of ``COLORINGS``. ``frusta``: whether cameras are drawn; ``path``:
+    whether a line leads from each to the next, in the order of their photos.
     """
 
     width: int = 1600
     height: int = 1000
     point_size_px: float | None = None
     background: str = "dark"
+    coloring: str = "rgb"
+    frusta: bool = True
+    path: bool = False
 
     def __post_init__(self) -> None:
         if not all(16 <= side <= _LARGEST_SIDE_PX for side in (self.width, self.height)):
@@ -37,6 +43,10 @@ class DrawOptions:
             raise ConfigError(
                 f"point size must be above 0 and at most {_LARGEST_POINT_PX:g} pixels, "
                 f"got {self.point_size_px:g}"
+            )
+        if self.coloring not in COLORINGS:
+            raise ConfigError(
+                f"points are coloured by one of {', '.join(COLORINGS)}, got {self.coloring}"
             )
         if self.background not in BACKGROUNDS:
             raise ConfigError(

@@ -43,6 +43,7 @@ def choose_view(
     *,
     azimuth_deg: float = _AZIMUTH_DEG,
     elevation_deg: float = _ELEVATION_DEG,
+    up: Float64Array | None = None,
 ) -> View:
     """A view of the whole scene with its cameras.
 
@@ -50,9 +51,11 @@ def choose_view(
     all of which stay inside; ``world_from_cam`` (K, 3, 3) are rotations in COLMAP's convention
     (x right, y down, z forward) and ``centres`` (K, 3) the projection centres, K at least 1;
     ``aspect`` is width over height. ``elevation_deg`` above the horizon, below 90;
-    ``azimuth_deg``: to the right of the cameras' heading, which the view has at 0.
+    ``azimuth_deg``: to the right of the cameras' heading, which the view has at 0. ``up`` (3,): by
+    default as the cameras tell.
     """
-    up = upward(world_from_cam, centres)
+    if up is None:
+        up = upward(world_from_cam, centres)
     towards = _viewing_direction(world_from_cam, up, azimuth_deg, elevation_deg)
     right = _unit(np.cross(towards, up))
     view_up = np.cross(right, towards)

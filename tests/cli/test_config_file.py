@@ -15,6 +15,7 @@ import pytest
 from sfm_front.cli.config_file import TAKEN_FROM, as_toml, read_options
 from sfm_front.cli.main import main
 from sfm_front.errors import ConfigError, InputError
+from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.mapping.initialization import ConstraintLevel, InitializationOptions
 from sfm_front.mapping.mapper_options import InitialPairConstraints
 from sfm_front.matching.guided_matching import GuidedOptions
@@ -298,6 +299,27 @@ def test_flags_win_over_the_file_and_leave_the_rest(capsys, tmp_path, file):
         cameras=CameraOptions(mode="per-image", model="PINHOLE"),
         positions=PositionOptions(source="geo.txt", vertical_sigma_m=7.0),
     )
+
+
+def test_a_quality_wins_over_the_file_and_flags_win_over_it(capsys, tmp_path, file):
+    file.write_text("max_image_size = 1000\nmax_features = 11\n")
+    draft = printed(capsys, tmp_path, "--config", file, "--quality", "draft")
+    assert draft == SessionOptions(max_image_size=800, max_features=2000)
+    high = printed(capsys, tmp_path, "--quality", "high", "--max-features", 12)
+    assert high == SessionOptions(max_image_size=2400, max_features=12)
+    assert printed(capsys, tmp_path, "--quality", "normal") == DEFAULT
+
+
+def test_file_and_flags_may_each_have_a_part_of_what_control_points_need(capsys, tmp_path, file):
+    file.write_text("[control_points]\nmarked_size = [4000, 3000]\n")
+    both = ControlOptions(file=Path("gcp.txt"), marked_size=(4000, 3000))
+    given = printed(capsys, tmp_path, "--config", file, "--gcp", "gcp.txt")
+    assert given == SessionOptions(control_points=both)
+    assert main(["reconstruct", "--print-config", "--config", str(file)]) == 2
+    assert "--gcp-size says how control points are" in capsys.readouterr().err
+    file.write_text('[control_points]\nfile = "gcp.txt"\n')
+    given = printed(capsys, tmp_path, "--config", file, "--gcp-size", "4000,3000")
+    assert given == SessionOptions(control_points=both)
 
 
 @pytest.mark.parametrize(("given", "vertical_m"), [("0.5", 1.0), ("0.5,3", 3.0)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 
 import numpy as np
@@ -48,6 +49,14 @@ def test_a_placed_photo_tells_its_model_and_its_verified_candidates(output, caps
     assert "verified with others, that came later or on a second look (inliers):" in told
 
 
+def test_other_programs_get_all_of_it_as_json(output, tmp_path, capsys):
+    drawn = ["--draw", str(tmp_path / "matches.png")]
+    assert main(["explain", str(output), "0002.jpg", "--json", *drawn]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["name"], told["model"]) == ("0002.jpg", "sparse/0")
+    assert {row["name"] for row in told["candidates"] if row["num_verified"]} == {"0001.jpg"}
+
+
 def test_a_photo_that_was_not_placed_tells_why(output, capsys):
     assert main(["explain", str(output), "noise.png"]) == 1
     told = capsys.readouterr().out
@@ -66,7 +75,7 @@ def test_matches_are_drawn(output, folder, tmp_path, capsys, photos_given):
     file = tmp_path / "matches.png"
     photos = ["--photos", str(folder)] if photos_given else []
     assert main(["explain", str(output), "0002.jpg", *photos, "--draw", str(file)]) == 0
-    assert f"wrote {file}" in capsys.readouterr().out
+    assert f"wrote {file}" in capsys.readouterr().err
     with Image.open(file) as picture:
         assert picture.width > 1000
 

@@ -19,6 +19,7 @@ from sfm_front.cli.reconstruct_arguments import session_options
 from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.search.folder_search import SearchOptions
 from sfm_front.session.options import SessionOptions, available_cores
+from sfm_front.session.quality import QUALITIES
 
 HEAVY = ("torch", "pycolmap", "cv2", "open3d", "faiss")
 
@@ -75,6 +76,12 @@ DEFAULTS = {
 DEFAULTS_OF = {
     reconstruct: DEFAULTS
     | {
+        "--quality": next(
+            name
+            for name, quality in QUALITIES.items()
+            if (quality.max_image_size, quality.max_features)
+            == (SESSION.max_image_size, SESSION.max_features)
+        ),
         "--seed": SESSION.seed,
         "--camera-mode": SESSION.cameras.mode,
         "--camera-model": SESSION.cameras.model,
@@ -100,6 +107,13 @@ def test_help_tells_the_defaults_of_the_options_and_no_others(command):
             (found,) = re.findall(r"\(default: ([^)]*)\)|(\S+) \(default\)", text)
             told[action.option_strings[0]] = "".join(found)
     assert told == {option: str(value) for option, value in DEFAULTS_OF[command].items()}
+
+
+def test_help_has_the_numbers_of_the_qualities():
+    (told,) = (a.help for a in parser()._actions if a.dest == "quality")
+    for name in ("draft", "high"):
+        quality = QUALITIES[name]
+        assert f"{quality.max_image_size} px, {quality.max_features} features" in told
 
 
 def test_the_seed_is_the_sessions_where_none_is_given():
@@ -193,6 +207,8 @@ def test_a_file_in_place_of_a_folder(photo, tmp_path, capsys):
         (["--gcp-size", "4000"], "--gcp-size takes width and height, got '4000'"),
         (["--gcp-size", "4000,2.5"], "--gcp-size takes width and height, got '4000,2.5'"),
         (["--gcp-size", "inf,inf"], "--gcp-size takes width and height, got 'inf,inf'"),
+        (["--gcp-size", "4000,3000"], "--gcp-size says how control points are: give them with"),
+        (["--gcp-accuracy", "0.1"], "--gcp-accuracy says how control points are: give them"),
         (["--gcp", "none.txt", "--georegister", "off"], "leave georegister = off out"),
         (["--global-descriptor", "bag"], "no global descriptor is called 'bag'"),
         (["--global-descriptor", "vlad", "--weights", "none.pth"], "--weights goes with one"),

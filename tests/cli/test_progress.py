@@ -8,7 +8,14 @@ import pytest
 
 from sfm_front.cli import progress
 from sfm_front.cli.progress import CountLine, ProgressLine
-from sfm_front.events import ControlPointsRefused, ModelRefined, PhotoAdded
+from sfm_front.cli.terminal import ERASE
+from sfm_front.events import (
+    ControlPointsRefused,
+    FinishingBegan,
+    FinishingStep,
+    ModelRefined,
+    PhotoAdded,
+)
 from sfm_front.types import Skipped, SkipReason
 
 
@@ -47,8 +54,8 @@ def test_without_a_terminal_there_is_a_line_a_photo(turn):
     turn(4.0)
     line.show(placed("b.jpg", 2, 150))
     assert stream.getvalue().splitlines() == [
-        "photo 1/4  registered 0  points 0  2.00 s per photo  0:06 left",
-        "photo 2/4  registered 2  points 150  3.00 s per photo  0:06 left",
+        "photo 1 of 4: 0 placed, 0 points  2.00 s a photo  0:06 left",
+        "photo 2 of 4: 2 placed, 150 points  3.00 s a photo  0:06 left",
     ]
 
 
@@ -61,8 +68,8 @@ def test_a_skipped_photo_is_named_with_its_reason_and_counts(turn):
     line.show(skipped)
     lines = stream.getvalue().splitlines()
     assert lines[1] == "skipped süd/b.jpg: duplicate: same file as a.jpg"
-    # The skipped photo takes nothing away from what is registered.
-    assert lines[2].startswith("photo 2/3  registered 5  points 70")
+    # The skipped photo takes nothing away from what is placed.
+    assert lines[2].startswith("photo 2 of 3: 5 placed, 70 points")
 
 
 def test_on_a_terminal_one_line_renews_itself(turn, monkeypatch):
@@ -74,7 +81,7 @@ def test_on_a_terminal_one_line_renews_itself(turn, monkeypatch):
         line.show(placed(f"{number}.jpg", number, 1_000_000))
     assert "\n" not in stream.getvalue()
     shown = stream.getvalue().split("\r\x1b[K")[1:]
-    assert [text.split("  ")[0] for text in shown] == ["photo 1/200", "photo 2/200", "photo 3/200"]
+    assert [text.split(":")[0] for text in shown] == [f"photo {n} of 200" for n in (1, 2, 3)]
     assert all(len(text) < 40 for text in shown)
 
 
@@ -102,14 +109,14 @@ def test_what_becomes_of_models_is_no_photo(turn):
     assert stream.getvalue() == ""
     turn(1.0)
     line.show(placed("a.jpg", 0, 0))
-    assert stream.getvalue().startswith("photo 1/2")
+    assert stream.getvalue().startswith("photo 1 of 2")
 
 
 def test_what_can_be_mended_while_photos_come_is_told_then_and_else_in_the_summary():
     stream = io.StringIO()
     line = ProgressLine(stream)
     line.show(ControlPointsRefused("line 7 is wrong."))
-    line.finishing()
+    line.show(FinishingBegan(FinishingStep.CONTROL_POINTS))
     line.show(ControlPointsRefused("line 8 is wrong."))
     first, _ = stream.getvalue().splitlines()
     assert first == "control points cannot be used: line 7 is wrong."
@@ -124,8 +131,8 @@ def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):
     line.end()
     lines = stream.getvalue().splitlines()
     assert len(lines) == 10
-    assert lines[0] == "indexing photo 4/40  0.50 s per photo  0:18 left"
-    assert lines[-1].startswith("indexing photo 40/40")
+    assert lines[0] == "indexing photo 4 of 40  0.50 s a photo  0:18 left"
+    assert lines[-1].startswith("indexing photo 40 of 40")
 
 
 def test_counting_on_a_terminal_renews_one_line_and_leaves_none():
@@ -135,7 +142,7 @@ def test_counting_on_a_terminal_renews_one_line_and_leaves_none():
         line.show(done, 3)
     line.end()
     assert "\n" not in terminal.getvalue()
-    assert "indexing photo 2/3" in terminal.getvalue()
+    assert "indexing photo 2 of 3" in terminal.getvalue()
     assert terminal.getvalue().endswith("\r\x1b[K")
 
 
@@ -144,4 +151,29 @@ def test_counting_a_few_photos_without_a_terminal_names_each():
     line = CountLine("photo", stream)
     for done in (1, 2, 3):
         line.show(done, 3)
-    assert [text.split()[1] for text in stream.getvalue().splitlines()] == ["1/3", "2/3", "3/3"]
+    assert [text.split()[1] for text in stream.getvalue().splitlines()] == ["1", "2", "3"]
+
+
+def test_quiet_leaves_only_what_must_be_mended():
+    terminal, log = Terminal(), io.StringIO()
+    for stream in (terminal, log):
+        line = ProgressLine(stream, quiet=True)
+        line.expect(2)
+        line.note("continuing out")
+        line.show(placed("a.jpg", 0, 0))
+        line.show(Skipped("b.jpg", SkipReason.EMPTY_FILE))
+        line.step("last adjustment")
+        line.close()
+    assert terminal.getvalue() == log.getvalue() == ""
+    line.show(ControlPointsRefused("line 7 is wrong."))
+    assert log.getvalue() == "control points cannot be used: line 7 is wrong.\n"
+
+
+def test_no_name_of_a_photo_moves_the_cursor():
+    stream = Terminal()
+    ProgressLine(stream).show(Skipped("a\x1b[2J\x1b]0;title\x07\r.jpg", SkipReason.EMPTY_FILE))
+    assert (
+        stream.getvalue()
+        .replace(ERASE, "")
+        .startswith("skipped a\\x1b[2J\\x1b]0;title\\x07\\x0d.jpg: empty file\n")
+    )

@@ -26,7 +26,7 @@ from sfm_front.cli.main import main
 from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct import default_output
 from sfm_front.evaluation.poses import auc, pose_errors
-from sfm_front.events import Event, PhotoAdded
+from sfm_front.events import Event, FinishingStep, PhotoAdded
 from sfm_front.photos.source import list_photos, order_photos
 
 SUB_FOLDER = "süd flug ✈"
@@ -119,7 +119,7 @@ def test_each_bad_file_is_named_with_its_reason(run, name):
 
 def test_a_page_is_written_last(run):
     page = run.output / "report.html"
-    assert run.stdout.splitlines()[-1] == f"to look at: {page}"
+    assert f"to look at: {page}" in run.stdout.splitlines()[-3:]
     text = page.read_text(encoding="utf-8")
     assert f"All {len(run.names)} photos are in one model" in text
     assert all(name in text for name in (*run.names, *BAD))
@@ -162,8 +162,18 @@ def test_keypoints_are_in_pixels_of_the_file(run):
 def test_the_summary_closes_the_output(run):
     count = len(run.names)
     photos = run.report["totals"]["photos"]
-    assert f"{count} of {photos} photos registered in 1 model" in run.stdout
-    assert re.search(rf"^photo {photos}/{photos}  registered \d+  points \d+", run.stdout, re.M)
+    verdict = f"All {count} photos are in one model, in metres; {len(BAD)} files were skipped"
+    assert re.search(rf"^{verdict}", run.stdout, re.M)
+    assert re.search(rf"^photo {photos} of {photos}: \d+ placed, \d+ points", run.stdout, re.M)
+    assert "by stage" not in run.stdout
+
+
+def test_the_steps_of_the_end_are_told_as_they_begin(run):
+    steps = re.findall(r"^finishing: (.*)$", run.stdout, re.M)
+    assert steps == [
+        *(step.value for step in FinishingStep if step is not FinishingStep.CONTROL_POINTS),
+        "drawing the page",
+    ]
 
 
 @pytest.fixture
@@ -196,13 +206,44 @@ def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int, number: int) -
     monkeypatch.setattr(ProgressLine, "show", show_and_interrupt)
 
 
+def test_json_is_all_that_standard_output_has(five, tmp_path, capsys):
+    (five / "torn.jpg").write_bytes(b"no image")
+    output = tmp_path / "out"
+    assert reconstruct(five, output, "--json") == 0
+    told, beside = capsys.readouterr()
+    result = json.loads(told)
+    assert result["verdict"]["level"] == "good"
+    assert result["verdict"]["sentence"] in beside.splitlines()
+    assert [row["name"] for row in result["skipped"]] == ["torn.jpg"]
+    (model,) = result["models"]
+    assert len(pycolmap.Reconstruction(model["path"]).reg_image_ids()) == model["registered"] == 5
+    assert Path(result["report_html"]).is_file()
+    assert Path(result["report_json"]).is_file()
+    # The same of a run that has nothing to do.
+    assert reconstruct(five, output, "--json", "--quiet") == 0
+    again, nothing = capsys.readouterr()
+    assert (json.loads(again), nothing) == (result, "")
+
+
+def test_quiet_is_one_line(five, tmp_path, capsys):
+    (five / "torn.jpg").write_bytes(b"no image")
+    assert reconstruct(five, tmp_path / "out", "--quiet") == 0
+    told, beside = capsys.readouterr()
+    (line,) = told.splitlines()
+    assert line.startswith("All 5 photos are in one model")
+    assert beside == ""
+
+
 @pytest.mark.usefixtures("handlers")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypatch, capfd, number):
     interrupt_after(monkeypatch, 4, number)
     handler = signal.getsignal(number)
     assert reconstruct(five, tmp_path / "out") == 0
-    assert "stopping: finishing with the photos taken so far" in capfd.readouterr().err
+    told = capfd.readouterr()
+    assert "stopping: finishing with the photos taken so far" in told.err
+    last = "stopped with 1 photo to go: the same command goes on from there"
+    assert told.out.splitlines()[-1] == last
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 5)]
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
@@ -214,7 +255,7 @@ def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypa
 def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch, capsys):
     interrupt_after(monkeypatch, 1, signal.SIGINT)
     assert reconstruct(five, tmp_path / "out") == 1
-    assert "no model could be built" in capsys.readouterr().out
+    assert "No model could be built" in capsys.readouterr().out
     left = {path.name for path in (tmp_path / "out" / "sparse").iterdir()}
     assert left == {"session.json", "georeference.json"}
     assert (tmp_path / "out" / "report.json").exists()
@@ -342,7 +383,7 @@ def test_an_interrupted_run_is_continued_by_the_same_command(five, tmp_path, mon
     assert reconstruct(five, output) == 0
     told = capsys.readouterr().out
     assert "2 photos are in it" in told
-    assert "photo 3/3" in told
+    assert "photo 3 of 3" in told
     report = json.loads((output / "report.json").read_text())
     assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 6)]
     assert report["totals"]["registered"] == 5
@@ -377,7 +418,7 @@ def test_events_are_printed_instead_of_the_progress(five, tmp_path, capsys):
     assert [e["name"] for e in events if e["event"] == "photo_added"] == [
         f"{n:04d}.jpg" for n in range(1, 6)
     ]
-    assert "5 of 5 photos registered" in printed.err
+    assert "All 5 photos are in one model" in printed.err
     written = (tmp_path / "out" / "events.jsonl").read_text().splitlines()
     assert [json.loads(line)["event"] for line in written] == [e["event"] for e in events]
 
@@ -413,7 +454,7 @@ def test_a_watched_folder_that_never_comes_gives_no_model(tmp_path, capsys):
     assert reconstruct(tmp_path / "card", tmp_path / "out", *WATCH) == 1
     printed = capsys.readouterr().out
     assert f"{tmp_path / 'card'}: waiting for it" in printed
-    assert "no model could be built: no photo came" in printed
+    assert "No model could be built: no photo came" in printed
 
 
 def test_a_second_watched_folder_is_added_with_all_its_photos(five, tmp_path):

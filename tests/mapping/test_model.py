@@ -235,6 +235,7 @@ def test_the_options_reach_pycolmap():
         global_refinements=4,
         final_tolerance=1e-7,
         large_final_tolerance=1e-8,
+        last_tolerance=1e-5,
     )
     options = MapperOptions(
         convergence=convergence,
@@ -251,6 +252,10 @@ def test_the_options_reach_pycolmap():
     final, large = (options.final(count).get_global_bundle_adjustment() for count in (49, 50))
     assert final.ceres.solver_options.function_tolerance == 1e-7
     assert large.ceres.solver_options.function_tolerance == 1e-8
+    last, large_last = options.last(49), options.last(50)
+    assert last.ba_global_max_refinements == large_last.ba_global_max_refinements == 1
+    assert last.ba_global_function_tolerance == 1e-5
+    assert large_last.ba_global_function_tolerance == 1e-8
     robust = options.robust
     assert (robust.num_threads, robust.refine_intrinsics, robust.large_from) == (3, False, 50)
 

@@ -23,7 +23,8 @@ from sfm_front.reports.report_json import read_report
 from sfm_front.reports.summary import closing_summary
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.resume import nothing_to_do
-from sfm_front.session.session import Session, SessionResult
+from sfm_front.session.session import Session
+from sfm_front.session.summing_up import SessionResult
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.types import Exif, ExtractedPhoto, GeoPosition
 

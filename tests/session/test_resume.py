@@ -22,7 +22,8 @@ from sfm_front.events import Event, ModelStarted, PhotoAdded, SessionEnded, Sess
 from sfm_front.session import snapshots
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.resume import Newcomers, is_finished
-from sfm_front.session.session import Session, SessionResult
+from sfm_front.session.session import Session
+from sfm_front.session.summing_up import SessionResult
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import ExtractedPhoto, NotYet, PhotoPath, Skipped, SkipReason
 

@@ -16,7 +16,8 @@ from sfm_front.retrieval.retriever import RetrievalOptions
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.pair_matching import PairMatchingOptions
 from sfm_front.session.second_look import SecondLookOptions
-from sfm_front.session.session import Session, SessionResult
+from sfm_front.session.session import Session
+from sfm_front.session.summing_up import SessionResult
 
 NUM_PHOTOS = 12
 POSITION_TOLERANCE_M = 0.3

@@ -13,7 +13,10 @@ from PIL import Image
 
 from sfm_front import viewers
 from sfm_front.cli import view as cli
+from sfm_front.cli.main import main
 from sfm_front.errors import ConfigError, DependencyError, InputError
+from sfm_front.georeference.sidecar import FILE_NAME, Sidecar, write_sidecar
+from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.runtime.subprocess_env import module_environment
 from sfm_front.viewers import offscreen, open3d_loader
 from sfm_front.viewers.model_drawing import build_scene, sequence_colors
@@ -103,6 +106,24 @@ def test_frusta_stand_where_the_cameras_are_and_open_as_wide():
     assert set(scene.lines[8:16].ravel()) == set(range(5, 10))  # a frustum has its own vertices
 
 
+def test_cameras_may_be_left_out_and_their_path_drawn():
+    bare = build_scene(walk_past_a_wall(), DrawOptions(frusta=False))
+    assert (bare.lines.shape, bare.line_colors.shape) == ((0, 2), (0, 3))
+    path = build_scene(walk_past_a_wall(), DrawOptions(frusta=False, path=True))
+    ends = path.vertices[path.lines]
+    np.testing.assert_allclose(ends[:, 0], [[i, 0, 0] for i in range(4)], atol=DIRECTION)
+    np.testing.assert_allclose(ends[:, 1], [[i + 1, 0, 0] for i in range(4)], atol=DIRECTION)
+    both = build_scene(walk_past_a_wall(), DrawOptions(path=True))
+    assert len(both.lines) == len(both.line_colors) == 8 * 5 + 4
+    for scene in (bare, path, both):
+        np.testing.assert_allclose(scene.view.eye, build_scene(walk_past_a_wall()).view.eye)
+
+
+def test_a_known_up_is_kept_whatever_the_cameras_say():
+    view = build_scene(walk_past_a_wall(), up=-UP).view
+    assert view.up @ -UP > 0.8
+
+
 def test_colors_run_through_the_sequence():
     colors = sequence_colors(9)
     assert ((colors >= 0) & (colors <= 1)).all()
@@ -155,7 +176,14 @@ def test_the_point_size_can_be_set():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"width": 3}, {"height": 100_000}, {"point_size_px": 0}, {"background": "pink"}]
+    "wrong",
+    [
+        {"width": 3},
+        {"height": 100_000},
+        {"point_size_px": 0},
+        {"background": "pink"},
+        {"coloring": "depth"},
+    ],
 )
 def test_wrong_options_are_refused(wrong):
     with pytest.raises(ConfigError, match="got"):
@@ -198,11 +226,13 @@ def test_a_window_without_a_screen_points_to_the_screenshot(tmp_path, monkeypatc
         viewers.view(tmp_path)
 
 
-def test_the_screenshot_shows_points_frusta_and_background(tmp_path):
+@pytest.mark.parametrize("frusta", [True, False])
+def test_the_screenshot_shows_points_frusta_and_background(tmp_path, frusta):
     walk_past_a_wall().write(tmp_path)
     out = tmp_path / "pictures" / "wall.png"
+    options = DrawOptions(width=320, height=200, background="white", frusta=frusta)
     try:
-        viewers.screenshot(tmp_path, out, DrawOptions(width=320, height=200, background="white"))
+        viewers.screenshot(tmp_path, out, options)
     except DependencyError as error:
         pytest.skip(str(error))
     pixels = np.asarray(Image.open(out)).astype(int)
@@ -211,22 +241,84 @@ def test_the_screenshot_shows_points_frusta_and_background(tmp_path):
     grey = (np.abs(pixels - 128) < 30).all(axis=2)
     colored = np.ptp(pixels, axis=2) > 100
     assert grey.sum() > 200
-    assert colored.sum() > 20
+    assert colored.sum() > 20 if frusta else colored.sum() == 0
 
 
 def test_arguments_become_options(tmp_path, monkeypatch, capsys):
     drawn = {}
-    monkeypatch.setattr(viewers, "screenshot", lambda *a: drawn.update(zip("mof", a, strict=True)))
+
+    def draw(*given):
+        drawn.update(zip("mofu", given, strict=True))
+        return ("height: 1 blue, 2 red",)
+
+    monkeypatch.setattr(viewers, "screenshot", draw)
     parser = argparse.ArgumentParser()
     cli.add_arguments(parser)
     out = tmp_path / "out.png"
     options = ["--size", "800x600", "--point-size", "3", "--background", "white"]
+    options += ["--color-by", "height", "--no-frusta", "--path"]
     args = parser.parse_args([str(tmp_path), "--screenshot", str(out), *options])
     assert cli.run(args) == 0
-    assert drawn["m"] == tmp_path
+    assert drawn["m"] == [tmp_path]
+    assert drawn["u"] is None
     assert drawn["o"] == out
-    assert drawn["f"] == DrawOptions(width=800, height=600, point_size_px=3, background="white")
-    assert str(out) in capsys.readouterr().out
+    assert drawn["f"] == DrawOptions(
+        width=800,
+        height=600,
+        point_size_px=3,
+        background="white",
+        coloring="height",
+        frusta=False,
+        path=True,
+    )
+    legend, wrote = capsys.readouterr().out.splitlines()
+    assert legend == "height: 1 blue, 2 red"
+    assert str(out) in wrote
+
+
+@pytest.fixture
+def several(tmp_path):
+    """An output with three models, the first two of which are in east, north and up."""
+    for number in (0, 1, 10):
+        folder = tmp_path / "sparse" / str(number)
+        folder.mkdir(parents=True)
+        walk_past_a_wall().write(folder)
+    write_sidecar(
+        tmp_path / "sparse" / FILE_NAME,
+        Sidecar(state=GeoreferenceState.METRIC, models_in_enu=(0, 1)),
+    )
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("more", "shown", "in_enu"),
+    [
+        ([], ["0", "1", "10"], False),
+        (["--model", "1"], ["1"], True),
+        (["--model", "10"], ["10"], 0),
+    ],
+)
+def test_an_output_shows_all_its_models_or_one(several, monkeypatch, more, shown, in_enu):
+    asked = []
+    monkeypatch.setattr(viewers, "view", lambda *given: asked.append(given))
+    assert main(["view", str(several), *more]) == 0
+    ((models, _, up),) = asked
+    assert [model.name for model in models] == shown
+    assert (up is not None) == in_enu
+
+
+@pytest.mark.parametrize(
+    ("place", "more", "told"),
+    [
+        (".", ["--model", "2"], "no model 2 in its sparse/, which has 0, 1, 10"),
+        ("sparse/1", ["--model", "1"], "is one model"),
+        ("none", [], "no such folder"),
+    ],
+)
+def test_a_model_that_is_not_there_is_one_line(several, capsys, place, more, told):
+    assert main(["view", str(several / place), *more]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert told in line
 
 
 def test_a_size_that_is_none_is_refused(capsys):

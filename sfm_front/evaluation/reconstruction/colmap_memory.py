@@ -27,6 +27,7 @@ def colmap_memory_bytes(output: Path) -> int | None:
 
 
 def _main(output: Path) -> None:
+    from sfm_front.geometry.lenses import take_intrinsics
     from sfm_front.mapping.view_graph import ViewGraph
     from sfm_front.storage.colmap_models import read_model
     from sfm_front.storage.database import DATABASE, PhotoDatabase
@@ -40,11 +41,13 @@ def _main(output: Path) -> None:
             pairs = database.pairs(photo.image_id)
             camera = cameras[photo.camera_id]
             view_graph.add(photo.image_id, photo.name, camera, keypoints, pairs)
-    held = [
-        view_graph.new_mapper(read_model(folder))
-        for folder in sorted((output / "sparse").iterdir())
-        if folder.is_dir()
-    ]
+    held = []
+    for folder in sorted(path for path in (output / "sparse").iterdir() if path.is_dir()):
+        model = read_model(folder)
+        for camera_id, camera in model.cameras.items():
+            # Its lens may have grown at the end; graph and models have the same while photos come.
+            take_intrinsics(camera, cameras[camera_id])
+        held.append(view_graph.new_mapper(model))
     after = resident_bytes()
     if before is not None and after is not None:
         print(after - before)

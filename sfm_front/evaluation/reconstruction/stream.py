@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
+import pycolmap
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import auc, pose_errors
 from sfm_front.evaluation.process import resident_bytes
 from sfm_front.evaluation.reconstruction.colmap_memory import colmap_memory_bytes
-from sfm_front.evaluation.synthetic.scene import as_described, make_scene
+from sfm_front.evaluation.synthetic.scene import SyntheticScene, as_described, make_scene
 from sfm_front.events import PhotoAdded
 from sfm_front.features.global_descriptors.descriptor import resolve
+from sfm_front.geometry.enu import LocalFrame
+from sfm_front.georeference.accuracy import bend_of_heights
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
-from sfm_front.types import Float64Array
+from sfm_front.types import Float64Array, GeoPosition
 
 _DESCRIPTOR = "vlad"
+# Where on earth the scene is, any place.
+_TAKE_OFF = LocalFrame(47.0, 8.0, 400.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +66,15 @@ class Memory:
 @dataclass(frozen=True, slots=True)
 class StreamResult:
     """``finish_seconds``: the end of the session, export included. ``auc``: of the pose errors of
-    all pairs, at 1, 3 and 5 degrees, in [0, 1]."""
+    all pairs, at 1, 3 and 5 degrees, in [0, 1]. ``bend_share``: how far the largest model is bent
+    up or down at the end, as a share of the extent; None for a small one."""
 
     photos: tuple[PhotoCost, ...]
     finish_seconds: float
     memory: Memory
     num_registered: int
     auc: tuple[float, ...]
+    bend_share: float | None = None
 
     def growth(self, early: slice, late: slice) -> Growth:
         """Mean over the late photos divided by mean over the early ones, for each figure."""
@@ -133,14 +140,19 @@ def run_stream(
     *,
     seed: int,
     note: Callable[[PhotoAdded], None],
+    gps_noise_m: float | None = None,
+    lens: tuple[float, float, float] | None = None,
 ) -> StreamResult:
     """Fly strips over hills and reconstruct from given features; nothing is read or detected.
 
-    ``note`` is called with each photo's report. Raises ConfigError for fewer than two photos.
+    ``note`` is called with each photo's report. ``gps_noise_m``: standard deviation along each axis
+    of the positions that photos have, and say that they have; without, they have none. ``lens``: as
+    ``make_scene`` takes it. Raises ConfigError for fewer than two photos, or a negative noise.
     """
     if num_photos < 2:
         raise ConfigError(f"a stream needs at least two photos, got {num_photos}")
-    scene = make_scene(num_photos, points_per_image, seed=seed, layout="strip")
+    scene = make_scene(num_photos, points_per_image, seed=seed, layout="strip", lens=lens)
+    positions = _positions(scene, gps_noise_m)
     descriptor, _ = resolve(_DESCRIPTOR)
     costs: list[PhotoCost] = []
     at_start = resident_bytes()
@@ -148,7 +160,7 @@ def run_stream(
         for index in range(num_photos):
             seen = scene.photo(index)
             vector = descriptor.describe(np.empty(0, np.uint8), seen.features)
-            photo = as_described(seen, scene.camera, vector)
+            photo = as_described(seen, scene.camera, vector, positions[index])
             started, processor_started = perf_counter(), process_time()
             added = session.add_extracted(photo)
             assert isinstance(added, PhotoAdded)  # no two photos of the scene are copies
@@ -174,4 +186,40 @@ def run_stream(
         memory=Memory(at_start, peak, colmap_memory_bytes(output)),
         num_registered=max((int(model.num_reg_images()) for model in models), default=0),
         auc=tuple(auc(pose_errors(scene.truth(), models))),
+        bend_share=_bend_share(scene, models),
     )
+
+
+def _positions(scene: SyntheticScene, noise_m: float | None) -> list[GeoPosition | None]:
+    """What GPS has of each photo."""
+    if noise_m is None:
+        return [None] * len(scene)
+    if not 0 < noise_m < float("inf"):
+        raise ConfigError(f"the noise of GPS must be a number of metres above 0, got {noise_m}")
+    rng = np.random.default_rng([scene.seed, 2])
+    measured = _centres(scene) + rng.normal(0.0, noise_m, (len(scene), 3))
+    return [
+        GeoPosition(latitude, longitude, altitude, noise_m, noise_m)
+        for latitude, longitude, altitude in _TAKE_OFF.to_wgs84(measured).tolist()
+    ]
+
+
+def _centres(scene: SyntheticScene) -> Float64Array:
+    """(N, 3) where the photos were taken; east, north and up in metres."""
+    return np.array([pose.inverse().translation for pose in scene.cams_from_world])
+
+
+def _bend_share(scene: SyntheticScene, models: Sequence[pycolmap.Reconstruction]) -> float | None:
+    """Of the largest model, laid upon the truth by the best similarity."""
+    if not models:
+        return None
+    model = max(models, key=lambda model: model.num_reg_images())
+    index = {scene.name(i): i for i in range(len(scene))}
+    images = [model.image(image_id) for image_id in model.reg_image_ids()]
+    found = np.array([image.projection_center() for image in images])
+    true = _centres(scene)[[index[image.name] for image in images]]
+    enu_from_model = pycolmap.estimate_sim3d(found, true)
+    if enu_from_model is None:
+        return None
+    bend = bend_of_heights(true, (enu_from_model * found - true)[:, 2])
+    return None if bend is None else bend.share_of_extent

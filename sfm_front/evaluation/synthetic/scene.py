@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.world import World, fly_orbit, fly_ring, fly_strip
-from sfm_front.types import Exif, ExtractedPhoto, Features, Float32Array, Float64Array, Uint8Array
+from sfm_front.types import (
+    Exif,
+    ExtractedPhoto,
+    Features,
+    Float32Array,
+    Float64Array,
+    GeoPosition,
+    Uint8Array,
+)
 
 Layout = Literal["orbit", "strip", "ring"]
 
@@ -130,6 +138,7 @@ def make_scene(
     outlier_ratio: float = 0.0,
     background_ratio: float = 0.3,
     repeatability: float = 0.8,
+    lens: tuple[float, float, float] | None = None,
 ) -> SyntheticScene:
     """Plan a flight and scatter the points that it sees.
 
@@ -139,18 +148,13 @@ def make_scene(
     over hills, and only its last photos see what its first ones saw. A point in view is detected
     with probability ``repeatability``, with noise of standard deviation ``noise_px`` along each
     axis. ``outlier_ratio`` of the detections are moved anywhere in the photo but keep their
-    descriptor: they cause wrong matches. ``background_ratio`` of all keypoints show no scene point:
-    they cause no matches. Raises ConfigError if a value is out of range.
+    descriptor: they cause wrong matches. ``background_ratio`` of all keypoints show no scene
+    point: they cause no matches. ``lens``: k1, p1, p2 of an OPENCV camera, not a SIMPLE_RADIAL one
+    with a k of -0.03. Raises ConfigError if a value is out of range.
     """
     _check(num_images, points_per_image, noise_px, outlier_ratio, background_ratio, repeatability)
     rng = np.random.default_rng([seed, 0])
-    camera = pycolmap.Camera(
-        camera_id=1,
-        model="SIMPLE_RADIAL",
-        width=1600,
-        height=1200,
-        params=[1300.0, 800.0, 600.0, -0.03],
-    )
+    camera = _camera(lens)
     if layout == "orbit":
         world, poses = fly_orbit(num_images, points_per_image, rng)
     elif layout == "strip":
@@ -173,10 +177,21 @@ def make_scene(
     )
 
 
+def _camera(lens: tuple[float, float, float] | None) -> pycolmap.Camera:
+    model, params = "SIMPLE_RADIAL", [1300.0, 800.0, 600.0, -0.03]
+    if lens is not None:
+        k1, p1, p2 = lens
+        model, params = "OPENCV", [1300.0, 1300.0, 800.0, 600.0, k1, 0.0, p1, p2]
+    return pycolmap.Camera(camera_id=1, model=model, width=1600, height=1200, params=params)
+
+
 def as_described(
-    photo: SyntheticPhoto, camera: pycolmap.Camera, global_vector: Float32Array
+    photo: SyntheticPhoto,
+    camera: pycolmap.Camera,
+    global_vector: Float32Array,
+    position: GeoPosition | None = None,
 ) -> ExtractedPhoto:
-    """The photo as if taken by ``camera``, read from a file and extracted.
+    """The photo as if taken by ``camera`` at ``position``, read from a file and extracted.
 
     ``global_vector`` (D,) float32.
     """
@@ -186,7 +201,7 @@ def as_described(
         width=camera.width,
         height=camera.height,
         digest=photo.name,
-        exif=Exif(),
+        exif=Exif(position=position),
         features=photo.features,
         global_vector=global_vector,
     )

@@ -143,8 +143,8 @@ def fly_ring(
 def _footprint(camera: pycolmap.Camera) -> tuple[float, float]:
     """Width and depth in metres of what a photo shows of flat ground."""
     return (
-        _ALTITUDE_M * camera.width / camera.focal_length,
-        _ALTITUDE_M * camera.height / camera.focal_length,
+        _ALTITUDE_M * camera.width / camera.mean_focal_length(),
+        _ALTITUDE_M * camera.height / camera.mean_focal_length(),
     )
 
 

@@ -160,7 +160,8 @@ def _automatic(
     try:
         descriptor, _ = resolve(joined, vlad_weight=vlad_weight, device=device, progress=progress)
     except (WeightsError, DependencyError) as error:
-        return GlobalDescriptor(local=[Vlad()]), f"global descriptor: {Vlad.name}, because {error}"
+        alone = f"similar photos are found by {Vlad.name} alone: {error}"
+        return GlobalDescriptor(local=[Vlad()]), alone
     return descriptor, f"global descriptor: {joined}, with torchvision's weights"
 
 

@@ -7,8 +7,9 @@ from sfm_front.georeference.flight_figures import FlightFigures
 from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.reports.html.control_points import control_points
-from sfm_front.reports.html.markup import Html, counted, joined, table, tag
+from sfm_front.reports.html.markup import Html, joined, table, tag
 from sfm_front.reports.html.material import Material
+from sfm_front.reports.words import counted
 
 _MOST_OUTLIERS = 10
 

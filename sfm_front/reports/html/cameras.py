@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-import numpy as np
 import pycolmap
 
 from sfm_front.reports.html.markup import Html, joined, section, table, tag
@@ -51,17 +50,6 @@ def camera_results(material: Material) -> list[CameraResult]:
             )
         )
     return results
-
-
-def median_change(results: list[CameraResult]) -> float | None:
-    """Of the focal lengths of all photos, without its sign; None where EXIF says nothing."""
-    changes = [
-        abs(result.change)
-        for result in results
-        if result.change is not None
-        for _ in range(result.num_photos)
-    ]
-    return float(np.median(changes)) if changes else None
 
 
 def cameras(material: Material, results: list[CameraResult]) -> Html | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from sfm_front.georeference.control.report import ControlReport
 from sfm_front.georeference.control.residuals import ControlAccuracy, PointResidual, PointRole
-from sfm_front.reports.html.markup import Html, counted, joined, table, tag
+from sfm_front.reports.html.markup import Html, joined, table, tag
+from sfm_front.reports.words import counted
 
 _STATES = {
     PointRole.CONTROL: "placed",

@@ -79,11 +79,6 @@ def table(head: Iterable[Child], rows: Iterable[Iterable[Child]], *, numbers_fro
     return tag("div", content, class_="scroll")
 
 
-def counted(count: int, noun: str) -> str:
-    """One photo, two photos."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def picture(image: Image.Image, *, lossless: bool = False) -> str:
     """A picture as an address: WebP of photos and renderings, PNG of what has few colours."""
     buffer = BytesIO()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sfm_front.reports.html import FILE, verdict
+from sfm_front.reports.html import FILE
 from sfm_front.reports.html.accuracy import accuracy
 from sfm_front.reports.html.cameras import camera_results, cameras
 from sfm_front.reports.html.distributions import reprojection_errors, track_lengths
@@ -18,7 +18,10 @@ from sfm_front.reports.html.photo_table import photo_table
 from sfm_front.reports.html.plan import plan
 from sfm_front.reports.html.stage_times import stage_times
 from sfm_front.reports.html.unplaced import unplaced
-from sfm_front.reports.summary import clock
+from sfm_front.reports.html.verdict import all_lights, as_list
+from sfm_front.reports.lights import Light
+from sfm_front.reports.verdict import verdict
+from sfm_front.reports.words import clock
 from sfm_front.storage.atomic import write_atomically
 
 _STYLE = Path(__file__).with_name("page.css")
@@ -62,22 +65,22 @@ def as_page(material: Material) -> str:
         tag("title", title),
         tag("style", Html(_STYLE.read_text(encoding="utf-8"))),
     )
-    start = _first_screen(material, verdict.lights(material, results), first)
+    start = _first_screen(material, all_lights(material), first)
     main = tag("main", start, joined(sections))
     body = tag("body", main, tag("footer", _origin(material)))
     return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
 
 
-def _first_screen(material: Material, found: list[verdict.Light], model: Html | None) -> Html:
+def _first_screen(material: Material, found: list[Light], model: Html | None) -> Html:
     return tag(
         "header",
         tag("p", _origin(material), class_="origin"),
         tag("h1", material.name),
-        tag("p", verdict.sentence(material), class_="verdict"),
+        tag("p", verdict(material.summary, material.sidecar).sentence, class_="verdict"),
         _figures(material),
         tag(
             "div",
-            verdict.as_list(found),
+            as_list(found),
             model,
             class_="first",
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -10,13 +11,16 @@ import pytest
 from helpers.locations import SCRIPTS
 
 from sfm_front.errors import ConfigError
+from sfm_front.evaluation.reconstruction.colmap_memory import colmap_memory_bytes
 from sfm_front.evaluation.reconstruction.stream import (
     Memory,
     PhotoCost,
     StreamResult,
     run_stream,
 )
+from sfm_front.geometry.lenses import grown, take_intrinsics
 from sfm_front.session.options import SessionOptions
+from sfm_front.storage.colmap_models import read_model
 
 SCRIPT = SCRIPTS / "benchmark_stream.py"
 EXPONENT_TOLERANCE = 0.05
@@ -85,6 +89,45 @@ def test_a_short_flight_goes_through_a_session(tmp_path):
         # Its share of what came since the start: 6 photos take less than what is loaded once.
         assert 0 < memory.colmap < memory.peak
     assert np.all([step.image_id is not None for step in steps])
+
+
+def test_a_flight_with_gps_and_another_lens_is_measured_against_the_truth(tmp_path):
+    output = tmp_path / "out"
+    result = run_stream(
+        24,
+        300,
+        output,
+        SessionOptions(global_descriptor="vlad", threads=1),
+        seed=1,
+        note=lambda _: None,
+        gps_noise_m=0.5,
+        lens=(-0.1, 0.001, -0.001),
+    )
+    assert result.num_registered == 24
+    assert result.auc[2] > 0.9
+    assert result.bend_share < 0.01
+    sidecar = json.loads((output / "sparse" / "georeference.json").read_text())
+    assert sidecar["state"] == "metric"
+    assert sidecar["residuals"]["median_m"] == pytest.approx(0.5 * np.sqrt(3), rel=0.5)
+
+
+@pytest.mark.parametrize("noise", [0.0, -1.0, float("nan")])
+def test_noise_of_gps_is_above_nothing(noise, tmp_path):
+    options = SessionOptions(global_descriptor="vlad")
+    with pytest.raises(ConfigError, match="the noise of GPS must be a number of metres above 0"):
+        run_stream(20, 100, tmp_path, options, seed=0, note=print, gps_noise_m=noise)
+
+
+def test_memory_is_told_of_models_whose_lenses_have_grown(tmp_path):
+    options = SessionOptions(global_descriptor="vlad", threads=1)
+    run_stream(6, 250, tmp_path, options, seed=1, note=lambda _: None)
+    folder = tmp_path / "sparse" / "0"
+    model = read_model(folder)
+    for camera in model.cameras.values():
+        take_intrinsics(camera, grown(camera, "OPENCV"))
+    model.write(folder)
+    memory = colmap_memory_bytes(tmp_path)
+    assert memory is None or memory > 0
 
 
 def test_one_photo_is_no_stream(tmp_path):

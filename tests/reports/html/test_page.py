@@ -215,7 +215,7 @@ def test_without_positions_nothing_is_said_of_them(tmp_path):
 
 def test_without_a_model_there_is_still_a_page(tmp_path):
     read = Reader(page_of(tmp_path / "out", has_model=False, sidecar=None))
-    assert "No model could be built from 9 photos." in read.text
+    assert "No model could be built from 9 photos" in read.text
     assert read.sections == {"unplaced", "matches", "time", "photos"}
 
 

@@ -1,4 +1,4 @@
-"""Lights and the sentence at the top."""
+"""The lights beside the verdict."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from helpers.report_making import METRIC, Output, summary_of
 from sfm_front.georeference.control.report import ControlReport
 from sfm_front.georeference.control.residuals import ControlAccuracy
 from sfm_front.georeference.spread import GeoreferenceState
-from sfm_front.reports.html.cameras import CameraResult, median_change
+from sfm_front.reports.camera_outcome import CameraOutcome
 from sfm_front.reports.html.material import Material
-from sfm_front.reports.html.verdict import Level, lights, sentence
+from sfm_front.reports.html.verdict import all_lights
+from sfm_front.reports.lights import Level, focal_length
 from sfm_front.storage.finished_session import FinishedSession
-from sfm_front.types import SkipReason
 
 
 def material_of(*, num_matched: int = 500, **output) -> Material:
@@ -27,12 +27,24 @@ def material_of(*, num_matched: int = 500, **output) -> Material:
     return Material(Path("out"), summary, models, FinishedSession(num_matched=matched), sidecar, {})
 
 
-def camera(num_photos: int, focal_px: float, exif_px: float | None) -> CameraResult:
-    return CameraResult(pycolmap.Camera(), num_photos, focal_px, exif_px)
+def camera(
+    num_photos: int, focal_px: float, exif_px: float | None, is_determined: bool | None = None
+) -> CameraOutcome:
+    return CameraOutcome(
+        model_path="sparse/0",
+        camera_id=1,
+        num_photos=num_photos,
+        lens="SIMPLE_PINHOLE",
+        params=(focal_px, 500.0, 400.0),
+        focal_px=focal_px,
+        prior_focal_px=exif_px,
+        focal_sigma=None,
+        is_determined=is_determined,
+    )
 
 
-def light(name: str, material: Material, cameras: list[CameraResult] | None = None):
-    (found,) = [light for light in lights(material, cameras or []) if light.name == name]
+def light(name: str, material: Material):
+    (found,) = [light for light in all_lights(material) if light.name == name]
     return found
 
 
@@ -69,16 +81,36 @@ def test_matches(matches, level):
     ],
 )
 def test_focal_length(focal_px, level):
-    assert light("Focal length", material_of(), [camera(5, focal_px, 1000)]).level is level
+    material = material_of()
+    summary = replace(material.summary, cameras=(camera(5, focal_px, 1000),))
+    assert light("Focal length", replace(material, summary=summary)).level is level
 
 
 def test_without_exif_nothing_is_said_of_the_focal_length():
-    assert light("Focal length", material_of(), [camera(5, 900, None)]).level is Level.UNKNOWN
+    assert focal_length([camera(5, 900, None)]).level is Level.UNKNOWN
+
+
+def test_where_the_photos_determine_it_exif_is_wrong():
+    found = focal_length([camera(5, 1200, 1000, is_determined=True)])
+    assert (found.level, found.doubt) == (Level.FAIR, "")
+    for unknown in (False, None):
+        found = focal_length([camera(5, 1200, 1000, is_determined=unknown)])
+        assert (found.level, found.doubt) == (
+            Level.BAD,
+            "its focal length is 20% from what EXIF says and not determined by the photos",
+        )
 
 
 def test_cameras_weigh_by_their_photos():
     cameras = [camera(5, 1010, 1000), camera(4, 1500, 1000), camera(90, 1, None)]
-    assert median_change(cameras) == pytest.approx(0.01)
+    assert focal_length(cameras).value == "1.0 %"
+
+
+def test_a_smaller_model_has_no_say_in_the_focal_length():
+    material = material_of()
+    other = replace(camera(9, 1500, 1000), model_path="sparse/1")
+    summary = replace(material.summary, cameras=(camera(5, 1000, 1000), other))
+    assert light("Focal length", replace(material, summary=summary)).level is Level.GOOD
 
 
 def test_fit_to_positions():
@@ -113,32 +145,3 @@ def test_fit_to_control_points():
 def test_doubtful_models_are_bad():
     assert light("Consistency", material_of(is_doubtful=True)).level is Level.BAD
     assert light("Consistency", material_of()).level is Level.GOOD
-
-
-@pytest.mark.parametrize(
-    ("output", "said"),
-    [
-        ({"num_waiting": 0}, "All 9 photos are in one model."),
-        ({"num_waiting": 0, "sidecar": METRIC}, "All 9 photos are in one model, in metres."),
-        (
-            {"num_waiting": 2, "why_not": "it is dark"},
-            "7 of 9 photos are in one model; 2 in none, because: it is dark.",
-        ),
-        ({"has_model": False}, "No model could be built from 9 photos."),
-        (
-            {"num_waiting": 0, "is_doubtful": True, "skipped": {"a": SkipReason.EMPTY_FILE}},
-            "All 9 photos are in one model, but some of their matches contradict it. "
-            "1 file could not be used.",
-        ),
-    ],
-)
-def test_the_sentence_says_what_came_out_and_why_it_is_no_more(output, said):
-    assert sentence(material_of(**output)) == said
-
-
-def test_several_models_are_said():
-    material = material_of(num_waiting=0)
-    models = [replace(material.summary.models[0], num_registered=n) for n in (6, 3)]
-    summary = replace(material.summary, models=tuple(models))
-    said = sentence(replace(material, summary=summary))
-    assert said == "6 of 9 photos are in one model; 3 more in 1 other."
