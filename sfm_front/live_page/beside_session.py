@@ -9,12 +9,10 @@ from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 
+from sfm_front.live_page.address import FIRST_PORT
 from sfm_front.live_page.extra import check_installed
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.subprocess_env import module_environment
-
-FIRST_PORT = 8080
-"""Ports are tried from here on."""
 
 # A page that no browser shows ends within this time.
 _ENDING_S = 2.0

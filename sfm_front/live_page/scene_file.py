@@ -9,11 +9,11 @@ from pathlib import Path
 import viser
 
 from sfm_front.errors import InputError
+from sfm_front.live_page.address import HOST
 from sfm_front.live_page.browser_view import set_first_view
 from sfm_front.live_page.follower import OutputFollower
 from sfm_front.live_page.scene_drawing import SceneDrawing
 from sfm_front.live_page.scenery import SceneMaker
-from sfm_front.live_page.server import HOST
 from sfm_front.reports.html import SCENE_FILE
 from sfm_front.storage.atomic import write_atomically
 

@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from sfm_front.live_page.access import keep_private
-from sfm_front.live_page.beside_session import FIRST_PORT
+from sfm_front.live_page.address import FIRST_PORT, HOST
 from sfm_front.live_page.browser_view import BrowserView, set_first_view
 from sfm_front.live_page.follower import OutputFollower, Seen
 from sfm_front.live_page.panels import MainPanel, set_theme
@@ -25,7 +25,6 @@ from sfm_front.reports.html.markup import visible
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.storage.watched_mark import mark_watched, unmark_watched
 
-HOST = "127.0.0.1"
 
 _TICK_S = 0.25
 # Of the time, at most this share goes into showing what is new; and it is shown at most so often.

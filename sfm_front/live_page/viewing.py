@@ -8,7 +8,8 @@ from pathlib import Path
 
 from sfm_front.errors import InputError
 from sfm_front.exporters.scene import output_of
-from sfm_front.live_page.beside_session import FIRST_PORT, Note
+from sfm_front.live_page.address import FIRST_PORT
+from sfm_front.live_page.beside_session import Note
 from sfm_front.live_page.extra import check_installed
 from sfm_front.reports import event_log
 from sfm_front.storage.colmap_models import find_models
