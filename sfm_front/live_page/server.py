@@ -25,7 +25,6 @@ from sfm_front.reports.html.markup import visible
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.storage.watched_mark import mark_watched, unmark_watched
 
-
 _TICK_S = 0.25
 # Of the time, at most this share goes into showing what is new; and it is shown at most so often.
 _MOST_SHARE = 0.25
