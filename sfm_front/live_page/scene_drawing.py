@@ -31,6 +31,9 @@ class SceneDrawing:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
+        # Nothing here has a shadow or shines; both would cost half of the pictures a second.
+        scene.configure_default_lights(cast_shadow=False)
+        scene.configure_environment_map(None)
         # Browsers complain of nodes without anything in them.
         nothing = np.zeros((1, 3), np.float32)
         self.points = scene.add_point_cloud(
