@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-import importlib.util
+import re
+from importlib import metadata
 from pathlib import Path
 
 from sfm_front.errors import DependencyError
 from sfm_front.storage.colmap_models import find_models
 
+_OLDEST = (1, 1)
+
 
 def is_installed() -> bool:
-    """Whether viser is."""
-    return importlib.util.find_spec("viser") is not None
+    """Whether viser is, and is new enough."""
+    try:
+        numbers = re.findall(r"\d+", metadata.version("viser"))
+    except metadata.PackageNotFoundError:
+        return False
+    return tuple(map(int, numbers[:2])) >= _OLDEST
 
 
 def check_installed() -> None:
     """Raises DependencyError, in one line, if it is not."""
     if not is_installed():
-        raise DependencyError("the live page needs viser: pip install 'sfm-front[live]'")
+        raise DependencyError("the live page needs viser 1.1: pip install 'sfm-front[live]'")
 
 
 def scene_if_possible(output: Path) -> Path | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from threading import RLock
+from typing import Any
 
 import numpy as np
 import viser
@@ -11,7 +12,7 @@ from sfm_front.live_page import palette, words
 from sfm_front.live_page.follower import Seen
 from sfm_front.live_page.photo_pictures import PhotoPictures
 from sfm_front.live_page.scene_drawing import quaternions
-from sfm_front.live_page.scenery import Scenery
+from sfm_front.live_page.scenery import Cameras, Scenery
 from sfm_front.reports.html.markup import visible
 
 _PICTURE_PX = 640
@@ -33,7 +34,9 @@ class PhotoPanel:
         self._state: tuple[Seen, Scenery] | None = None
         # What stands in the list → the photo.
         self._choices: dict[str, str] = {}
-        self._nodes: list[viser.SceneNodeHandle] = []
+        self._nodes: list[Any] = []
+        # The photo that they show.
+        self._drawn: str | None = None
         gui = client.gui
         panel = gui.add_panel()
         with panel.add_tab("Photo"):
@@ -105,50 +108,55 @@ class PhotoPanel:
 
     def _draw_nodes(self, scenery: Scenery, matched: list[str]) -> None:
         """The frustum with the picture, and lines to the photos that it matches."""
-        self._remove_nodes()
-        cameras = scenery.cameras
         assert self._name is not None
-        index = cameras.index(self._name)
+        cameras, index = scenery.cameras, scenery.cameras.index(self._name)
+        if index is None or self._name != self._drawn:
+            self._remove_nodes()
         if index is None:
             return
+        if self._drawn is None:
+            self._add_nodes(cameras, index)
+        frustum, lines = self._nodes
+        frustum.wxyz = quaternions(cameras.rotations[index][None])[0]
+        frustum.position = cameras.centres[index]
+        # A little larger than the one that all see, so that it lies before it.
+        depth = float(cameras.sizes[index][2])
+        frustum.scale = 1.02 * depth / frustum.compute_canonical_frustum_size()[2]
+        at = {name: place for place, name in enumerate(cameras.names)}
+        ends = [at[name] for name in matched if name in at]
+        lines.visible = len(ends) > 0
+        if ends:
+            starts = np.repeat(cameras.centres[index][None], len(ends), axis=0)
+            lines.points = np.stack([starts, cameras.centres[ends]], axis=1).astype(np.float32)
+
+    def _add_nodes(self, cameras: Cameras, index: int) -> None:
         width, height, depth = cameras.sizes[index].tolist()
-        picture = self._pictures.stored(self._name, _FRUSTUM_PX)
-        scene = self._client.scene
+        scene, name = self._client.scene, cameras.names[index]
         frustum = scene.add_camera_frustum(
             "/selected/frustum",
             fov=2 * float(np.arctan2(height, depth)),
             aspect=width / height,
             color=palette.LINK,
-            image=picture,
+            image=self._pictures.stored(name, _FRUSTUM_PX),
             thickness=2.5,
             thickness_units="screen",
             cast_shadow=False,
             receive_shadow=False,
-            wxyz=quaternions(cameras.rotations[index][None])[0],
-            position=cameras.centres[index],
         )
-        # A little larger than the one that all see, so that it lies before it.
-        frustum.scale = 1.02 * depth / frustum.compute_canonical_frustum_size()[2]
-        self._nodes.append(frustum)
-        at = {name: place for place, name in enumerate(cameras.names)}
-        ends = [at[name] for name in matched if name in at]
-        if ends:
-            starts = np.repeat(cameras.centres[index][None], len(ends), axis=0)
-            segments = np.stack([starts, cameras.centres[ends]], axis=1)
-            self._nodes.append(
-                scene.add_line_segments(
-                    "/selected/links",
-                    segments.astype(np.float32),
-                    palette.LINK,
-                    thickness=2.0,
-                    thickness_units="screen",
-                )
-            )
+        lines = scene.add_line_segments(
+            "/selected/links",
+            np.zeros((1, 2, 3), np.float32),
+            palette.LINK,
+            thickness=2.0,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._nodes, self._drawn = [frustum, lines], name
 
     def _remove_nodes(self) -> None:
         for node in self._nodes:
             node.remove()
-        self._nodes = []
+        self._nodes, self._drawn = [], None
 
     def _draw_matches(self, seen: Seen, name: str) -> None:
         """With the photo that it matches best."""

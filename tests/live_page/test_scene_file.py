@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from importlib import metadata
 
 import pytest
 from helpers.live_session import orbit, photos_of, run_session
@@ -41,9 +41,14 @@ def test_without_a_model_there_is_none(tmp_path):
         write_scene(tmp_path)
 
 
-def test_without_the_extra_a_line_says_what_to_install(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "viser", None)
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+@pytest.mark.parametrize("version", ["1.0.21", None])
+def test_without_the_extra_a_line_says_what_to_install(tmp_path, monkeypatch, capsys, version):
+    def find(_: str) -> str:
+        if version is None:
+            raise metadata.PackageNotFoundError
+        return version
+
+    monkeypatch.setattr(metadata, "version", find)
     (tmp_path / "photos").mkdir()
     assert main(["view", str(tmp_path), "--web"]) == 2
     assert capsys.readouterr().err.count("pip install 'sfm-front[live]'") == 1
