@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 import zlib  # noqa: F401  (before pycolmap)
+from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
 
@@ -18,12 +19,12 @@ from sfm_front.live_page.server import LivePage
 
 # A page that is loaded anew is without its browser for a moment.
 _PATIENCE_S = 3.0
+_NICE = 10
 
 
 def main(output: Path, port: int) -> None:
     """Serve the page until it is no longer wanted."""
-    if hasattr(os, "nice"):
-        os.nice(5)  # Photos come first.
+    _let_photos_come_first()
     has_ended, is_alone = Event(), Event()
     Thread(target=_listen, args=(has_ended, is_alone), daemon=True).start()
     last_seen_s = float("-inf")
@@ -41,6 +42,15 @@ def main(output: Path, port: int) -> None:
             return is_alone.is_set() or (has_ended.is_set() and forsaken)
 
         page.run(is_unwanted)
+
+
+def _let_photos_come_first() -> None:
+    """Take what processor time the session leaves."""
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    # Linux shares the processor between groups of processes first, and this is one of its own.
+    with suppress(OSError):
+        Path("/proc/self/autogroup").write_text(str(_NICE))
 
 
 def _listen(has_ended: Event, is_alone: Event) -> None:

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from sfm_front.live_page import time_chart, words
+from sfm_front.live_page import photo_words, time_chart, words
 from sfm_front.live_page.follower import Seen
+from sfm_front.live_page.markup_parts import note
 from sfm_front.live_page.photo_pictures import PhotoPictures
 from sfm_front.live_page.scene_drawing import SceneDrawing
 
@@ -43,7 +44,7 @@ class MainPanel:
         with tabs.add_tab("Gaps"):
             self._gaps = gui.add_html("")
         with tabs.add_tab("Times"):
-            gui.add_html(str(words.note(_ABOUT_TIMES)))
+            gui.add_html(str(note(_ABOUT_TIMES)))
             self._times = gui.add_uplot(
                 time_chart.columns([]),
                 time_chart.series(),
@@ -61,8 +62,8 @@ class MainPanel:
         self._headline.content = str(words.headline(seen))
         self._about.content = str(words.newest(seen))
         self._events.content = str(words.events(seen))
-        self._photos.content = str(words.photo_list(seen))
-        self._gaps.content = str(words.gaps(seen))
+        self._photos.content = str(photo_words.photo_list(seen))
+        self._gaps.content = str(photo_words.gaps(seen))
         self._legend.content = str(words.legend(seen))
         added = [photo for photo in seen.story.photos.values() if photo.seconds]
         self._times.data = time_chart.columns(added)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from sfm_front.live_page import palette, words
+from sfm_front.live_page import palette, photo_words
 from sfm_front.live_page.follower import Seen
 from sfm_front.live_page.photo_pictures import PhotoPictures
 from sfm_front.live_page.scene_drawing import quaternions
@@ -102,7 +102,7 @@ class PhotoPanel:
         observed = 0
         if shape is not None and self._name in shape.names:
             observed = int(shape.num_observed[list(shape.names).index(self._name)])
-        self._figures.content = str(words.photo_figures(seen, outcome, pairs, observed))
+        self._figures.content = str(photo_words.photo_figures(seen, outcome, pairs, observed))
         self._figures.visible = True
         self._draw_nodes(scenery, [name for name, _ in pairs])
 

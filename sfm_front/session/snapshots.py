@@ -35,8 +35,9 @@ _MAX_SHARE = 0.05
 # what was mapped when a young session is killed, at most a quarter is mapped again.
 _FIRST_S = 1.0
 _SHARE_OF_AGE = 1 / 3
-# Who looks at the models wants to see them grow.
+# Who looks at the models wants to see them grow, but not to wait for them.
 _WATCHED_S = 1.0
+_WATCHED_SHARE = 0.02
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,9 @@ class Snapshots:
         """Whether the last one is old enough."""
         now = time.monotonic()
         wanted_s = max(_FIRST_S, (self._last - self._began) * _SHARE_OF_AGE)
-        if wanted_s > _WATCHED_S and is_watched(self._folder.parent):
-            wanted_s = _WATCHED_S
+        watched_s = max(_WATCHED_S, self._spent / _WATCHED_SHARE)
+        if watched_s < wanted_s and is_watched(self._folder.parent):
+            wanted_s = watched_s
         return now - self._last >= max(min(self._interval_s, wanted_s), self._spent / _MAX_SHARE)
 
     def write(

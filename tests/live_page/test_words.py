@@ -7,7 +7,7 @@ import re
 import pytest
 from helpers.live_session import HOSTILE
 
-from sfm_front.live_page import words
+from sfm_front.live_page import photo_words, words
 from sfm_front.live_page.event_words import in_words
 from sfm_front.live_page.follower import Outcome, Seen
 from sfm_front.live_page.story import PhotoState, PhotoStory, Story
@@ -35,7 +35,15 @@ def text_of(markup: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "part", [words.headline, words.newest, words.events, words.photo_list, words.gaps, words.legend]
+    "part",
+    [
+        words.headline,
+        words.newest,
+        words.events,
+        photo_words.photo_list,
+        photo_words.gaps,
+        words.legend,
+    ],
 )
 def test_names_are_text(part):
     markup = part(seen(PLACED=2, WAITING=2, SKIPPED=1, ARRIVED=1, DESCRIBED=1))
@@ -48,7 +56,7 @@ def test_names_are_text(part):
 def test_figures_of_one_photo_are_text():
     what = seen(WAITING=1)
     (outcome,) = what.outcomes.values()
-    markup = words.photo_figures(what, outcome, [(HOSTILE, 12)], 5)
+    markup = photo_words.photo_figures(what, outcome, [(HOSTILE, 12)], 5)
     assert "<img" not in markup
     assert "12" in text_of(markup)
 
@@ -75,7 +83,7 @@ def test_the_headline_says_how_it_stands(ended, now, expected):
 
 
 def test_long_lists_keep_what_is_not_placed():
-    markup = words.photo_list(seen(WAITING=5, PLACED=400))
+    markup = photo_words.photo_list(seen(WAITING=5, PLACED=400))
     assert markup.count("WAITING") >= 5
     assert "and 100 more that are placed" in text_of(markup)
 
