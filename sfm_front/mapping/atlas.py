@@ -23,7 +23,8 @@ from sfm_front.mapping.lens_growth import simplify_lenses
 from sfm_front.mapping.localization import LocalizationOptions, locate, registered_photo
 from sfm_front.mapping.lookalikes import FoldOptions
 from sfm_front.mapping.mapper_options import MapperOptions
-from sfm_front.mapping.model import Model, ModelState
+from sfm_front.mapping.model import Model
+from sfm_front.mapping.model_state import ModelState
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry, View, WaitingReason
 

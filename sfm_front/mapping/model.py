@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import pycolmap
 
@@ -18,33 +18,16 @@ from sfm_front.mapping.bundle_adjustment import (
 )
 from sfm_front.mapping.calibration import impossible_photos, is_miscalibrated
 from sfm_front.mapping.camera_motion import camera_centers, camera_motion
-from sfm_front.mapping.carry_over import Before, carry_over
+from sfm_front.mapping.carry_over import carry_over
 from sfm_front.mapping.final_adjustment import drop_misfits, final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
+from sfm_front.mapping.model_state import ModelState
 from sfm_front.mapping.position_priors import PositionPriors, held_to_positions
+from sfm_front.mapping.refinement_beside import RefinementBeside
 from sfm_front.mapping.refinement_schedule import RefinementSchedule
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import Float64Array
-
-# Smaller models are refined at once: it takes no longer than to hand them on.
-_SMALLEST_BACKGROUND = 8
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModelState:
-    """What a model knows beside its reconstruction, to go on from one read from disk."""
-
-    model_id: int
-    # Photos and points at its last global refinement.
-    refined_images: int
-    refined_points: int
-    # Inliers it asks of a photo's pose: fewer if it started from few points.
-    min_pose_inliers: int
-    # False if it was grown with its camera fixed.
-    refine_intrinsics: bool
-    # Whether its world is a frame of the earth.
-    is_georeferenced: bool = False
 
 
 class Model:
@@ -74,8 +57,7 @@ class Model:
         self._view_graph = view_graph
         self._options = options
         self.emit = emit
-        self._adjuster = adjuster
-        self._under_way: tuple[int, Before] | None = None
+        self._beside = RefinementBeside(adjuster)
         self._streaming = options.streaming()
         self._mapping = self._streaming.get_mapper()
         self._triangulation = self._streaming.get_triangulation()
@@ -126,7 +108,11 @@ class Model:
         It tells nobody of its refinements until it is given ``emit``.
         """
         return Model.restored(
-            self._view_graph, self._options, reconstruction, self.state, adjuster=self._adjuster
+            self._view_graph,
+            self._options,
+            reconstruction,
+            self.state,
+            adjuster=self._beside.adjuster,
         )
 
     @property
@@ -253,22 +239,22 @@ class Model:
         False while it happens in the background: ask again.
         """
         self._take_refined()
-        if self._under_way is None and not self._is_settled:
+        if not self.is_under_way and not self._is_settled:
             self._refine_while_growing()
         return self._is_settled
 
     @property
     def _is_settled(self) -> bool:
-        return self._under_way is None and self._schedule.last[0] == self.num_registered
+        return not self.is_under_way and self._schedule.last[0] == self.num_registered
 
     @property
     def is_under_way(self) -> bool:
         """Whether it is being refined in the background."""
-        return self._under_way is not None
+        return self._beside.is_under_way
 
     def leave_refinement(self) -> None:
         """What is refined in the background is not waited for: all of it will be done at once."""
-        self._under_way = None
+        self._beside.leave()
 
     def georeference(self, enu_from_world: pycolmap.Sim3d, priors: PositionPriors) -> None:
         """Move the world to the frame of these positions, to which it is held from now on.
@@ -362,36 +348,25 @@ class Model:
         return False
 
     def _refine_while_growing(self) -> None:
-        adjuster = self._adjuster
-        if adjuster is not None:
-            adjuster.poll()
-        if adjuster is None or adjuster.is_broken or self.num_registered < _SMALLEST_BACKGROUND:
+        if not self._beside.serves(self.reconstruction):
             self._refine(self._streaming)
-        elif adjuster.is_free:  # else it stays due
+        elif self._beside.is_free:  # else it stays due
             self._begin_anew()
             self._mapper.complete_and_merge_tracks(self._triangulation)
-            before = Before.of(self.reconstruction)
-            self._under_way = adjuster.submit(self.reconstruction, self._options), before
+            self._beside.begin(self.reconstruction, self._options)
             self._note_refined()
 
     def _take_refined(self) -> None:
         """Carry over what refinement in the background has changed, if it has ended."""
-        if self._adjuster is None or self._under_way is None:
-            return
-        ticket, before = self._under_way
-        self._adjuster.poll()
-        if self._adjuster.is_busy:
-            return
-        self._under_way = None
-        refined = self._adjuster.result(ticket)
+        refined = self._beside.ended()
         if refined is None:
             return
         started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         neighbors = {
             i: self._view_graph.strongest_neighbors(i)
-            for i in self.registered - before.poses.keys()
+            for i in self.registered - refined.before.poses.keys()
         }
-        carry_over(self.reconstruction, before, refined, neighbors)
+        carry_over(self.reconstruction, refined.before, refined.copy, neighbors)
         self._begin_anew()
         self._mapper.complete_and_merge_tracks(self._triangulation)
         self._mapper.filter_points(self._mapping)
@@ -404,7 +379,7 @@ class Model:
         self._mapper.begin_reconstruction(self.reconstruction)
 
     def _refine(self, pipeline: pycolmap.IncrementalPipelineOptions) -> None:
-        self._under_way = None
+        self._beside.leave()
         started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         self._begin_anew()
         self._mapper.iterative_global_refinement(

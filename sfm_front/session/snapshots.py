@@ -21,7 +21,8 @@ from sfm_front.exporters.colmap import (
     recover_models,
 )
 from sfm_front.georeference.sidecar import Sidecar
-from sfm_front.mapping.model import Model, ModelState
+from sfm_front.mapping.model import Model
+from sfm_front.mapping.model_state import ModelState
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.storage.watched_mark import is_watched
 from sfm_front.types import ModelSummary, Uint8Array

@@ -13,7 +13,7 @@ from sfm_front.mapping.atlas import Atlas, AtlasOptions
 from sfm_front.mapping.audit import agreeing, audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.mapper_options import MapperOptions
-from sfm_front.mapping.model import ModelState
+from sfm_front.mapping.model_state import ModelState
 from sfm_front.mapping.unfolding import unfold
 
 OPTIONS = AtlasOptions(mapper=MapperOptions(num_threads=1))
