@@ -22,7 +22,7 @@ PACKAGE = ROOT / "sfm_front"
 FLOORS = (
     ("cli", "evaluation"),
     ("sfm_front",),
-    ("session", "search"),
+    ("session", "search", "live_page"),
     ("reports", "exporters"),
     ("features", "retrieval", "viewers", "georeference"),
     ("matching", "mapping", "storage"),
@@ -55,7 +55,7 @@ LIBRARIES = {
     ),
     "torchvision": (),
     "open3d": ("sfm_front.viewers.open3d_loader",),
-    "viser": (),
+    "viser": ("sfm_front.live_page",),
     "matplotlib": ("sfm_front.evaluation",),
     "watchfiles": ("sfm_front.photos.folder_changes",),
     "pyproj": ("sfm_front.photos.crs",),

@@ -29,6 +29,10 @@ class LiveLine:
         if not self._quiet:
             self._print(text)
 
+    def keep(self, text: str) -> None:
+        """The same, however quiet it is."""
+        self._print(text)
+
     def end(self) -> None:
         if self._live and not self._quiet:
             self._stream.write(ERASE)

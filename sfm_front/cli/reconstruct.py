@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.words import counted
 
 if TYPE_CHECKING:
+    from sfm_front.live_page.beside_session import PageBesideSession
     from sfm_front.session.options import SessionOptions
     from sfm_front.types import NotYet, PhotoPath
 
@@ -32,6 +33,11 @@ _STOPPING = "stopping: finishing with the photos taken so far; once more leaves 
 
 def run(arguments: argparse.Namespace) -> int:
     """Reconstruct, or print the options; 1 if no model could be built, else 0."""
+    with ExitStack() as opened:
+        return _run(arguments, opened)
+
+
+def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
     if arguments.print_config:
         from sfm_front.cli.config_file import as_toml
 
@@ -53,6 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     overwrite, append = arguments.overwrite, arguments.append
     # Once more: pycolmap has put a handler of its own for SIGTERM in place.
     with leaving_at_signal(1):
+        from sfm_front.live_page.extra import scene_if_possible
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
         from sfm_front.reports.html.page import write_page
         from sfm_front.session.output_folder import holds_session
@@ -76,6 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
         spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
         progress = ProgressLine(spoken, quiet=arguments.quiet)
         on_event = _event_printer() if arguments.events else progress.show
+        # Also with --quiet: nobody finds the page without its address.
+        page = _page(output, progress.keep, opened) if arguments.viewer else None
         session = Session(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
         )
@@ -108,13 +117,22 @@ def run(arguments: argparse.Namespace) -> int:
                 break
         result = session.finish()
         progress.step("drawing the page")
+        scene_if_possible(output)
         write_page(output)
         progress.close()
         tell_result(arguments, result.summary, output, spoken)
         if not arguments.watch and taken < len(new):
             left = counted(len(new) - taken, "photo")
             print(f"stopped with {left} to go: the same command goes on from there", file=spoken)
+    if page is not None:
+        page.stay()
     return 0 if result.models else 1
+
+
+def _page(output: Path, note: Callable[[str], None], opened: ExitStack) -> PageBesideSession:
+    from sfm_front.live_page.beside_session import PageBesideSession
+
+    return opened.enter_context(PageBesideSession(output, note))
 
 
 def _event_printer() -> Listener:

@@ -54,6 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --watch, finish when no photo has come for that long",
     )
     parser.add_argument(
+        "--viewer",
+        action="store_true",
+        help="a page for browsers on this machine that shows the models grow; needs the extra live",
+    )
+    parser.add_argument(
         "--snapshot-seconds",
         type=float,
         metavar="SECONDS",

@@ -19,8 +19,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write ``report.html`` into the output; 0 if it was written."""
+    from sfm_front.live_page.extra import scene_if_possible
     from sfm_front.reports.html.page import write_page
 
     file = write_page(arguments.output, arguments.photos)
     print(file if arguments.quiet else f"wrote {file}: open it in a browser")
+    scene = scene_if_possible(arguments.output)
+    if scene is not None and not arguments.quiet:
+        print(f"wrote {scene}: the models to turn in a browser")
     return 0

@@ -49,6 +49,8 @@ def tell_nothing_to_do(arguments: argparse.Namespace, output: Path) -> None:
 def _next_steps(summary: RunSummary, output: Path) -> list[str]:
     """What to do with the result, to be copied."""
     lines = [f"to look at: {output / html.FILE}"]
+    if (output / html.SCENE_FILE).is_file():
+        lines.append(f"            {output / html.SCENE_FILE}")
     if summary.models:
         folder = shlex.quote(str(output))
         lines += [

@@ -1,7 +1,8 @@
 """Show sparse models in a window, or save a picture of them.
 
 Of an output with several models all are shown: in their place where they are georeferenced, else
-side by side. Up is up: in east, north and up, or as the cameras tell.
+side by side. Up is up: in east, north and up, or as the cameras tell. With --web, a page in the
+browser follows a session while it runs, also one of another process.
 """
 
 from __future__ import annotations
@@ -36,6 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="output of a reconstruction, or folder with a COLMAP model, binary or text",
     )
     parser.add_argument("--model", type=int, metavar="N", dest="number", help="only sparse/N of it")
+    parser.add_argument(
+        "--web",
+        action="store_true",
+        help="a page for browsers on this machine, which follows a session that runs",
+    )
     parser.add_argument(
         "--screenshot", type=Path, metavar="FILE.png", help="write a picture, without a screen"
     )
@@ -74,6 +80,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do what ``add_arguments`` parsed; the exit status."""
+    if args.web:
+        from sfm_front.live_page.viewing import serve
+
+        serve(args.model, lambda line: print(line, flush=True))
+        return 0
     options = DrawOptions(
         width=args.size[0],
         height=args.size[1],

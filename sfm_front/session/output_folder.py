@@ -23,6 +23,7 @@ _FILES = (
     event_log.FILE,
     report_json.FILE,
     html.FILE,
+    html.SCENE_FILE,
     _MARKER,
 )
 _MODELS = ("sparse", "sparse.new", "sparse.old")

@@ -24,6 +24,7 @@ from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.mapping.model import Model
 from sfm_front.mapping.model_state import ModelState
 from sfm_front.storage.colmap_models import read_model
+from sfm_front.storage.watched_mark import is_watched
 from sfm_front.types import ModelSummary, Uint8Array
 
 logger = logging.getLogger(__name__)
@@ -35,6 +36,9 @@ _MAX_SHARE = 0.05
 # what was mapped when a young session is killed, at most a quarter is mapped again.
 _FIRST_S = 1.0
 _SHARE_OF_AGE = 1 / 3
+# Who looks at the models wants to see them grow, but not to wait for them.
+_WATCHED_S = 1.0
+_WATCHED_SHARE = 0.02
 
 
 @dataclass(frozen=True)
@@ -48,20 +52,27 @@ class Snapshot:
 
 
 class Snapshots:
-    """Writes the models every ``interval_s``, and more often while the session is young."""
+    """Writes the models every ``interval_s``, and more often while the session is young or somebody
+    looks at them."""
 
     def __init__(self, folder: Path, interval_s: float) -> None:
         self._folder = folder
         self._interval_s = interval_s
         # Model id → point id; later points have higher ones.
         self._last_colored: dict[int, int] = {}
-        self._began = time.monotonic()
-        self._next = self._began + min(interval_s, _FIRST_S)
+        self._began = self._last = time.monotonic()
+        # How long the last one took.
+        self._spent = 0.0
 
     @property
     def is_due(self) -> bool:
         """Whether the last one is old enough."""
-        return time.monotonic() >= self._next
+        now = time.monotonic()
+        wanted_s = max(_FIRST_S, (self._last - self._began) * _SHARE_OF_AGE)
+        watched_s = max(_WATCHED_S, self._spent / _WATCHED_SHARE)
+        if watched_s < wanted_s and is_watched(self._folder.parent):
+            wanted_s = watched_s
+        return now - self._last >= max(min(self._interval_s, wanted_s), self._spent / _MAX_SHARE)
 
     def write(
         self,
@@ -104,9 +115,8 @@ class Snapshots:
             },
             sidecar=sidecar,
         )
-        now = time.monotonic()
-        wanted_s = max(_FIRST_S, (now - self._began) * _SHARE_OF_AGE)
-        self._next = now + max(min(self._interval_s, wanted_s), (now - started) / _MAX_SHARE)
+        self._last = time.monotonic()
+        self._spent = self._last - started
         return summaries
 
     def _color_new(self, model: Model, colors: Mapping[int, Uint8Array]) -> None:

@@ -33,11 +33,14 @@ _VISIBLE = {
 }
 
 
+def visible(value: object) -> str:
+    """Any text with all of it to be seen, and fit to be written."""
+    return str(value).translate(_VISIBLE)
+
+
 def escaped(value: object) -> Html:
     """Any text as it may stand between tags or in an attribute."""
-    if isinstance(value, Html):
-        return value
-    return Html(html.escape(str(value).translate(_VISIBLE)))
+    return value if isinstance(value, Html) else Html(html.escape(visible(value)))
 
 
 def joined(children: Iterable[Child], by: str = "") -> Html:

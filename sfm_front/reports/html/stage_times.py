@@ -14,7 +14,7 @@ _MOST_COLUMNS = 300
 
 # What a reader tells apart → stages as sessions time them. The first run ahead, beside the turns of
 # earlier photos.
-_GROUPS = {
+STAGE_GROUPS = {
     "reading": ("read",),
     "features": ("sift", "vlad", "network"),
     "retrieval": ("retrieve", "rerank"),
@@ -23,7 +23,7 @@ _GROUPS = {
     "adjustment": ("refine",),
     "writing": ("store",),
 }
-_OTHER = "other"
+OTHER = "other"
 
 
 def stage_times(material: Material) -> Html | None:
@@ -60,11 +60,11 @@ def stage_times(material: Material) -> Html | None:
 
 
 def _layers(photos: list[PhotoOutcome]) -> list[Series]:
-    known = {stage: group for group, stages in _GROUPS.items() for stage in stages}
-    values = {group: np.zeros(len(photos)) for group in (*_GROUPS, _OTHER)}
+    known = {stage: group for group, stages in STAGE_GROUPS.items() for stage in stages}
+    values = {group: np.zeros(len(photos)) for group in (*STAGE_GROUPS, OTHER)}
     for place, photo in enumerate(photos):
         for stage, seconds in photo.seconds.items():
-            values[known.get(stage, _OTHER)][place] += 1000 * seconds
+            values[known.get(stage, OTHER)][place] += 1000 * seconds
     return [Series(group, of_photos) for group, of_photos in values.items()]
 
 

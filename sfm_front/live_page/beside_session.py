@@ -1,0 +1,67 @@
+"""Start the page beside a session, and let it go when the session has ended."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from threading import Thread
+
+from sfm_front.live_page.address import FIRST_PORT
+from sfm_front.live_page.extra import check_installed
+from sfm_front.runtime.closeable import Closeable
+from sfm_front.runtime.subprocess_env import module_environment
+
+# A page that no browser shows ends within this time.
+_ENDING_S = 2.0
+_STAYS = "the live page stays while a browser shows it; close it there, or press Ctrl-C"
+
+Note = Callable[[str], None]
+
+
+class PageBesideSession(Closeable):
+    """The page in a process of its own, so that the session's threads do not wait for it."""
+
+    def __init__(self, output: Path, note: Note, port: int = FIRST_PORT) -> None:
+        """``note`` is called with the page's address, from another thread, once it is known.
+
+        Raises DependencyError if the page's library is not there.
+        """
+        check_installed()
+        self._note = note
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "sfm_front.live_page.page_process", str(output), str(port)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=module_environment(),
+            encoding="utf-8",
+            # Ctrl-C is for the session.
+            start_new_session=True,
+        )
+        Thread(target=self._tell_address, daemon=True).start()
+
+    def _tell_address(self) -> None:
+        assert self._process.stdout is not None
+        address = self._process.stdout.readline().strip()
+        if address:
+            self._note(f"live page: {address}")
+
+    def stay(self) -> None:
+        """The session has ended: wait until no browser shows the page any more, or for Ctrl-C."""
+        assert self._process.stdin is not None
+        with suppress(OSError):
+            self._process.stdin.write("ended\n")
+            self._process.stdin.flush()
+        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
+            self._process.wait(_ENDING_S)
+            return
+        self._note(_STAYS)
+        with suppress(KeyboardInterrupt):
+            self._process.wait()
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.wait()

@@ -1,0 +1,129 @@
+"""All that is known of an output at one moment, from the files that its session writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sfm_front.errors import InputError
+from sfm_front.live_page.event_tail import EventTail
+from sfm_front.live_page.model_shapes import ModelReader, Models, ModelShape
+from sfm_front.live_page.story import PhotoState, PhotoStory, Story
+from sfm_front.reports import event_log, report_json
+from sfm_front.storage.colmap_models import is_model
+
+_GIVEN_UP = "its model was given up"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What became of a photo: its state, the place of its model among the models, or why it has
+    none and what would help, where that is known. ``is_weak``: few other photos hold it."""
+
+    photo: PhotoStory
+    state: PhotoState
+    model: int | None
+    reason: str = ""
+    hint: str = ""
+    is_weak: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """``models``: those of ``sparse/``. ``fresh``: photos that were placed since these were
+    written, whose poses are in the same frames. ``outcomes`` by name, in order of arrival."""
+
+    story: Story
+    models: Sequence[ModelShape]
+    fresh: Sequence[PhotoStory]
+    outcomes: Mapping[str, Outcome]
+
+    def named(self, state: PhotoState) -> list[Outcome]:
+        """The photos in this state."""
+        return [one for one in self.outcomes.values() if one.state is state]
+
+    @property
+    def newest(self) -> PhotoStory | None:
+        """The photo that came last, while others may follow."""
+        return self.story.newest if self.story.ended is None else None
+
+    @property
+    def weak(self) -> list[Outcome]:
+        """Photos in a model that few others hold."""
+        return [one for one in self.outcomes.values() if one.is_weak]
+
+
+class OutputFollower:
+    """Looks at an output again and again."""
+
+    def __init__(self, output: Path) -> None:
+        """``output`` of a session, or a COLMAP model of any program."""
+        self._report = output / report_json.FILE
+        self._tail = EventTail(output / event_log.FILE)
+        self._reader = ModelReader(output if is_model(output) else output / "sparse")
+        self._story = Story()
+        self._models = Models([], 0.0)
+        self._hints: dict[str, str] = {}
+        self._has_looked = False
+
+    def look(self) -> Seen | None:
+        """What is known now; None if nothing has changed since the last look."""
+        events, is_anew = self._tail.new()
+        if is_anew:
+            self._story, self._models, self._hints = Story(), Models([], 0.0), {}
+        for event in events:
+            self._story.tell(event)
+        models = self._reader.new()
+        if models is None and not events and not is_anew and self._has_looked:
+            return None
+        self._has_looked = True
+        self._models = models or self._models
+        if self._story.ended:
+            self._hints = self._read_hints()
+        return self._seen()
+
+    def _seen(self) -> Seen:
+        shapes, written = self._models.shapes, self._models.written
+        place_of = {shape.model_id: place for place, shape in enumerate(shapes)}
+        in_model = {name: place for place, shape in enumerate(shapes) for name in shape.names}
+        fresh = [
+            photo
+            for photo in self._story.photos.values()
+            if photo.pose is not None
+            and photo.state is PhotoState.PLACED
+            and photo.name not in in_model
+            and photo.time > written
+            and photo.pose.model_id in place_of
+            and self._story.moved.get(photo.pose.model_id, 0.0) <= written
+        ]
+        for photo in fresh:
+            assert photo.pose is not None
+            in_model[photo.name] = place_of[photo.pose.model_id]
+        photos = dict(self._story.photos)
+        for shape in shapes:  # Of models without events, or whose events are lost.
+            for name in shape.names:
+                photos.setdefault(name, PhotoStory(name, PhotoState.PLACED))
+        outcomes = {name: self._outcome(photo, in_model, written) for name, photo in photos.items()}
+        return Seen(self._story, shapes, fresh, outcomes)
+
+    def _outcome(self, photo: PhotoStory, in_model: Mapping[str, int], written: float) -> Outcome:
+        model = in_model.get(photo.name)
+        if model is not None:
+            linked = sum(in_model.get(name) == model for name in photo.links)
+            is_weak = photo.image_id is not None and linked < self._story.few_pairs
+            return Outcome(photo, PhotoState.PLACED, model, is_weak=is_weak)
+        if photo.state is PhotoState.PLACED and photo.time > written:
+            # The models that hold it are still to be written.
+            return Outcome(photo, PhotoState.PLACED, None)
+        hint = self._hints.get(photo.name, "")
+        if photo.state is PhotoState.PLACED:
+            return Outcome(photo, PhotoState.WAITING, None, _GIVEN_UP, hint)
+        return Outcome(photo, photo.state, None, photo.reason, hint)
+
+    def _read_hints(self) -> dict[str, str]:
+        try:
+            used = report_json.read_report(self._report.parent).used
+        except InputError:
+            return {}
+        return {photo.name: photo.hint for photo in used if photo.hint}

@@ -1,0 +1,64 @@
+"""The page of ``reconstruct --viewer``, in a process of its own: OUTPUT PORT.
+
+It prints its address. Its session says ``ended`` on standard input when all is written: then the
+page stays while a browser shows it. It ends with its session's process in any case.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+import zlib  # noqa: F401  (before pycolmap)
+from contextlib import suppress
+from pathlib import Path
+from threading import Event, Thread
+
+from sfm_front.live_page.server import LivePage
+
+# A page that is loaded anew is without its browser for a moment.
+_PATIENCE_S = 3.0
+_NICE = 10
+
+
+def main(output: Path, port: int) -> None:
+    """Serve the page until it is no longer wanted."""
+    _let_photos_come_first()
+    has_ended, is_alone = Event(), Event()
+    Thread(target=_listen, args=(has_ended, is_alone), daemon=True).start()
+    last_seen_s = float("-inf")
+
+    with LivePage(output, port) as page:
+        # pycolmap would write a page of its own.
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        print(page.address, flush=True)
+
+        def is_unwanted() -> bool:
+            nonlocal last_seen_s
+            if page.num_browsers:
+                last_seen_s = time.monotonic()
+            forsaken = time.monotonic() - last_seen_s > _PATIENCE_S
+            return is_alone.is_set() or (has_ended.is_set() and forsaken)
+
+        page.run(is_unwanted)
+
+
+def _let_photos_come_first() -> None:
+    """Take what processor time the session leaves."""
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    # Linux shares the processor between groups of processes first, and this is one of its own.
+    with suppress(OSError):
+        Path("/proc/self/autogroup").write_text(str(_NICE))
+
+
+def _listen(has_ended: Event, is_alone: Event) -> None:
+    for line in sys.stdin:
+        if line.strip() == "ended":
+            has_ended.set()
+    is_alone.set()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))

@@ -1,0 +1,131 @@
+"""How a session goes, as markup: figures, the newest photo, what became of models.
+
+All text is escaped: photos are called whatever their makers like.
+"""
+
+from __future__ import annotations
+
+import time
+
+from sfm_front.live_page import palette
+from sfm_front.live_page.follower import Seen
+from sfm_front.live_page.markup_parts import PADDED, ROW, SCROLL, dot, what_became
+from sfm_front.live_page.story import PhotoState
+from sfm_front.reports.html.markup import Html, joined, tag
+from sfm_front.reports.words import clock, counted
+
+_MOST_EVENTS = 14
+# A session that is this silent may be gone.
+_SILENT_S = 60.0
+
+_TILE = "flex:1 1 5em;padding:.45em .6em;border-radius:.4em;background:rgba(128,134,145,.12)"
+_BIG = "font-size:1.25em;font-weight:600;line-height:1.2;white-space:nowrap"
+_SMALL = "font-size:.75em;opacity:.72"
+
+
+def headline(seen: Seen, now: float | None = None) -> Html:
+    """How far the session is, in figures; ``now``: seconds since 1970."""
+    story = seen.story
+    placed = seen.named(PhotoState.PLACED)
+    taken = [one for one in seen.outcomes.values() if one.state is not PhotoState.ARRIVED]
+    num_points = sum(shape.num_points for shape in seen.models)
+    tiles = [
+        _tile(f"{len(placed)} / {len(taken)}", "photos placed"),
+        _tile(f"{num_points:,}".replace(",", "\N{THIN SPACE}"), "points"),
+        _tile(str(len(seen.models)), "model" if len(seen.models) == 1 else "models"),
+    ]
+    recent = [sum(one.photo.seconds.values()) for one in taken if one.photo.seconds][-20:]
+    if recent:
+        tiles.append(_tile(f"{sorted(recent)[len(recent) // 2]:.2f} s", "a photo"))
+    waiting, skipped = seen.named(PhotoState.WAITING), seen.named(PhotoState.SKIPPED)
+    queued = seen.named(PhotoState.ARRIVED)
+    notes = [
+        dot(palette.WAITING, f"{counted(len(waiting), 'photo')} waiting") if waiting else None,
+        dot(palette.WEAK, f"{len(seen.weak)} weakly held") if seen.weak else None,
+        dot(palette.FAINT, f"{len(skipped)} not used") if skipped else None,
+        dot(palette.FAINT, f"{len(queued)} to come") if queued and story.ended is None else None,
+    ]
+    return tag(
+        "div",
+        tag("div", _status(seen, time.time() if now is None else now), style="margin-bottom:.5em"),
+        tag("div", *tiles, style="display:flex;flex-wrap:wrap;gap:.4em"),
+        tag(
+            "div",
+            *notes,
+            style="display:flex;flex-wrap:wrap;gap:.2em 1em;margin-top:.5em;font-size:.85em",
+        ),
+        style="padding:.6em .8em .4em",
+    )
+
+
+def _status(seen: Seen, now: float) -> Html:
+    story = seen.story
+    if story.began is None or story.last is None:
+        return tag("b", "a model" if seen.models else "waiting for a session to begin …")
+    lasted = clock(story.last - story.began)
+    if story.ended is True:
+        return joined([dot(palette.LINK, tag("b", "finished")), f" after {lasted}"])
+    if story.ended is False:
+        return joined([dot(palette.WAITING, tag("b", "stopped")), f" after {lasted}"])
+    silent_s = now - story.last
+    if silent_s > _SILENT_S:
+        return joined(
+            [dot(palette.WEAK, tag("b", "running")), f", nothing new for {clock(silent_s)}"]
+        )
+    return joined([dot(palette.NEWEST, tag("b", "running")), f" for {clock(now - story.began)}"])
+
+
+def legend(seen: Seen) -> Html:
+    """What the colours of cameras and lines mean."""
+    models = [
+        dot(
+            palette.of_model(place),
+            "placed" if len(seen.models) < 2 else f"model {seen.models[place].model_id}",
+        )
+        for place in range(min(max(len(seen.models), 1), len(palette.MODELS)))
+    ]
+    return tag(
+        "div",
+        *models,
+        dot(palette.NEWEST, "newest"),
+        dot(palette.WEAK, "held by few others"),
+        dot(palette.WAITING, "others wait here"),
+        dot(palette.LINK, "matched with the newest"),
+        style="display:flex;flex-wrap:wrap;gap:.1em .9em;padding:.5em .8em;font-size:.8em",
+    )
+
+
+def newest(seen: Seen) -> Html:
+    """The newest photo, and what it matches."""
+    photo = seen.story.newest
+    if photo is None:
+        return tag("div", "No photo yet.", style=PADDED)
+    outcome = seen.outcomes[photo.name]
+    best = sorted(photo.links, key=lambda name: -photo.links[name])
+    return tag(
+        "div",
+        tag("b", photo.name),
+        f" {what_became(seen, outcome)}",
+        tag("br"),
+        f"{photo.num_keypoints} keypoints; best matches: " if best else "",
+        ", ".join(best[:4]),
+        style=PADDED,
+    )
+
+
+def events(seen: Seen) -> Html:
+    """What became of models, the latest first."""
+    rows = [
+        tag(
+            "div",
+            tag("span", time.strftime("%H:%M:%S", time.localtime(at)), style="opacity:.6"),
+            tag("span", words),
+            style=ROW,
+        )
+        for at, words in reversed(seen.story.lines[-_MOST_EVENTS:])
+    ]
+    return tag("div", *rows, style=f"{PADDED};{SCROLL};max-height:24vh")
+
+
+def _tile(figure: str, label: str) -> Html:
+    return tag("div", tag("div", figure, style=_BIG), tag("div", label, style=_SMALL), style=_TILE)
