@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import re
 import shutil
-import signal
 import sqlite3
 import sys
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,22 +16,17 @@ import pycolmap
 import pytest
 from helpers.locations import VILLAGE
 from helpers.model_building import make_model
-from helpers.signal_handlers import default_handlers
+from helpers.reconstructing import reconstruct
 from PIL import Image
 
-from sfm_front.cli.main import main
-from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct import default_output
 from sfm_front.evaluation.poses import auc, pose_errors
-from sfm_front.events import Event, FinishingStep, PhotoAdded
+from sfm_front.events import FinishingStep
 from sfm_front.photos.source import list_photos, order_photos
 
 SUB_FOLDER = "süd flug ✈"
-# Less than is had at full size: what the tests need is a fair run that is quick.
-SMALL = ("--max-image-size", "640", "--max-features", "1500")
 pytestmark = pytest.mark.slow
 
-FAST = (*SMALL, "--candidates", "12", "--global-descriptor", "vlad")
 AUC_AT_5_DEG = 0.85
 
 BAD = {
@@ -67,10 +59,6 @@ def tables(database: Path) -> dict[str, list[tuple[object, ...]]]:
             if name not in ("sfm_front_photos", "sfm_front_session")
         ]
         return {name: connection.execute(f'SELECT * FROM "{name}"').fetchall() for name in names}
-
-
-def reconstruct(folder: Path, output: Path, *more: str) -> int:
-    return main(["reconstruct", str(folder), "--output", str(output), *FAST, *more])
 
 
 @pytest.fixture(scope="module")
@@ -176,36 +164,6 @@ def test_the_steps_of_the_end_are_told_as_they_begin(run):
     ]
 
 
-@pytest.fixture
-def five(tmp_path) -> Path:
-    folder = tmp_path / "photos"
-    folder.mkdir()
-    for photo in sorted((VILLAGE / "images").iterdir())[:5]:
-        shutil.copy(photo, folder / photo.name)
-    return folder
-
-
-@pytest.fixture
-def handlers() -> Iterator[None]:
-    with default_handlers():
-        yield
-
-
-def interrupt_after(monkeypatch: pytest.MonkeyPatch, photos: int, number: int) -> None:
-    """Send a signal when this many photos have been added."""
-    show = ProgressLine.show
-    shown = []
-
-    def show_and_interrupt(line: ProgressLine, event: Event) -> None:
-        show(line, event)
-        if isinstance(event, PhotoAdded):
-            shown.append(event)
-            if len(shown) == photos:
-                signal.raise_signal(number)
-
-    monkeypatch.setattr(ProgressLine, "show", show_and_interrupt)
-
-
 def test_json_is_all_that_standard_output_has(five, tmp_path, capsys):
     (five / "torn.jpg").write_bytes(b"no image")
     output = tmp_path / "out"
@@ -232,75 +190,6 @@ def test_quiet_is_one_line(five, tmp_path, capsys):
     (line,) = told.splitlines()
     assert line.startswith("All 5 photos are in one model")
     assert beside == ""
-
-
-@pytest.mark.usefixtures("handlers")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypatch, capfd, number):
-    interrupt_after(monkeypatch, 4, number)
-    handler = signal.getsignal(number)
-    assert reconstruct(five, tmp_path / "out") == 0
-    told = capfd.readouterr()
-    assert "stopping: finishing with the photos taken so far" in told.err
-    last = "stopped with 1 photo to go: the same command goes on from there"
-    assert told.out.splitlines()[-1] == last
-    report = json.loads((tmp_path / "out" / "report.json").read_text())
-    assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 5)]
-    model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
-    assert model.num_reg_images() == report["totals"]["registered"] >= 3
-    assert signal.getsignal(number) is handler
-
-
-@pytest.mark.usefixtures("handlers")
-def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch, capsys):
-    interrupt_after(monkeypatch, 1, signal.SIGINT)
-    assert reconstruct(five, tmp_path / "out") == 1
-    assert "No model could be built" in capsys.readouterr().out
-    left = {path.name for path in (tmp_path / "out" / "sparse").iterdir()}
-    assert left == {"session.json", "georeference.json"}
-    assert (tmp_path / "out" / "report.json").exists()
-
-
-def after_photo(monkeypatch: pytest.MonkeyPatch, name: str, act: Callable[[], object]) -> None:
-    """Do something when this photo has been added; on one thread, the next is being read then."""
-    show = ProgressLine.show
-
-    def show_and_act(line: ProgressLine, event: Event) -> None:
-        show(line, event)
-        if isinstance(event, PhotoAdded) and event.name == name:
-            act()
-
-    monkeypatch.setattr(ProgressLine, "show", show_and_act)
-
-
-def test_a_photo_that_is_deleted_before_it_is_read_is_named(five, tmp_path, monkeypatch, capsys):
-    after_photo(monkeypatch, "0001.jpg", (five / "0005.jpg").unlink)
-    assert reconstruct(five, tmp_path / "out", "--threads", "1") == 0
-    gone = "skipped 0005.jpg: unreadable: No such file or directory"
-    lines = capsys.readouterr().out.splitlines()
-    assert [line for line in lines if line.startswith("skipped ")] == [gone]
-    assert pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0").num_reg_images() == 4
-
-
-def test_a_folder_that_goes_away_leaves_what_was_read(five, tmp_path, monkeypatch, capsys):
-    """As a card that is pulled out."""
-    after_photo(monkeypatch, "0003.jpg", lambda: five.rename(tmp_path / "away"))
-    assert reconstruct(five, tmp_path / "out", "--threads", "1") == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert "skipped 0005.jpg: unreadable: No such file or directory" in lines
-    # The fourth may have been read already.
-    model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
-    assert model.num_reg_images() in (3, 4)
-
-
-def test_a_closed_pipe_does_not_cost_the_models(five, tmp_path, monkeypatch):
-    """As with ``| head -1``."""
-    receiver, sender = os.pipe()
-    os.close(receiver)
-    with os.fdopen(sender, "w") as pipe:
-        monkeypatch.setattr(sys, "stdout", pipe)
-        assert reconstruct(five, tmp_path / "out") == 0
-    assert pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0").num_reg_images() == 5
 
 
 def test_one_thread_and_a_seed_repeat_to_the_bit(five, tmp_path):
@@ -373,22 +262,6 @@ def test_the_same_command_again_has_nothing_to_do(five, tmp_path, capsys):
     assert {path: path.read_bytes() for path in (output / "sparse").rglob("*.bin")} == before
 
 
-@pytest.mark.usefixtures("handlers")
-def test_an_interrupted_run_is_continued_by_the_same_command(five, tmp_path, monkeypatch, capsys):
-    output = tmp_path / "out"
-    with monkeypatch.context() as patched:
-        interrupt_after(patched, 2, signal.SIGINT)
-        reconstruct(five, output)
-    capsys.readouterr()
-    assert reconstruct(five, output) == 0
-    told = capsys.readouterr().out
-    assert "2 photos are in it" in told
-    assert "photo 3 of 3" in told
-    report = json.loads((output / "report.json").read_text())
-    assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 6)]
-    assert report["totals"]["registered"] == 5
-
-
 def test_another_folder_is_added_when_asked(five, tmp_path, capsys):
     """The second folder's names are taken, and one of its photos is in the first one, too."""
     output, second = tmp_path / "out", tmp_path / "second"
@@ -421,80 +294,3 @@ def test_events_are_printed_instead_of_the_progress(five, tmp_path, capsys):
     assert "All 5 photos are in one model" in printed.err
     written = (tmp_path / "out" / "events.jsonl").read_text().splitlines()
     assert [json.loads(line)["event"] for line in written] == [e["event"] for e in events]
-
-
-WATCH = ("--watch", "--idle-timeout", "0.5")
-
-
-def test_photos_are_taken_as_they_appear_in_a_folder(five, tmp_path, monkeypatch, capsys):
-    """The last one comes once the others are in the model."""
-    late = five / "0005.jpg"
-    content = late.read_bytes()
-    late.unlink()
-    after_photo(monkeypatch, "0004.jpg", lambda: late.write_bytes(content))
-    assert reconstruct(five, tmp_path / "out", *WATCH) == 0
-    report = json.loads((tmp_path / "out" / "report.json").read_text())
-    assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 6)]
-    assert report["totals"]["registered"] == 5
-    assert "from arrival to pose: median " in capsys.readouterr().out
-    # Nothing new: it goes on with what is there, and ends.
-    assert reconstruct(five, tmp_path / "out", *WATCH) == 0
-    assert "continuing" in capsys.readouterr().out
-
-
-@pytest.mark.usefixtures("handlers")
-def test_watching_ends_at_a_signal_with_the_photos_taken_so_far(five, tmp_path, monkeypatch):
-    interrupt_after(monkeypatch, 5, signal.SIGTERM)
-    assert reconstruct(five, tmp_path / "out", "--watch") == 0
-    report = json.loads((tmp_path / "out" / "report.json").read_text())
-    assert report["totals"]["registered"] == 5
-
-
-def test_a_watched_folder_that_never_comes_gives_no_model(tmp_path, capsys):
-    assert reconstruct(tmp_path / "card", tmp_path / "out", *WATCH) == 1
-    printed = capsys.readouterr().out
-    assert f"{tmp_path / 'card'}: waiting for it" in printed
-    assert "No model could be built: no photo came" in printed
-
-
-def test_a_second_watched_folder_is_added_with_all_its_photos(five, tmp_path):
-    """Its first photo has a name of its own, the next one a name that the first folder has."""
-    second = tmp_path / "second"
-    second.mkdir()
-    (five / "0004.jpg").rename(second / "0000.jpg")
-    (five / "0005.jpg").rename(second / "0001.jpg")
-    assert reconstruct(five, tmp_path / "out", *WATCH) == 0
-    assert reconstruct(second, tmp_path / "out", *WATCH) == 2
-    assert reconstruct(second, tmp_path / "out", *WATCH, "--append") == 0
-    report = json.loads((tmp_path / "out" / "report.json").read_text())
-    names = [row["name"] for row in report["photos"] if row["registered"]]
-    assert names == ["0001.jpg", "0002.jpg", "0003.jpg", "second/0000.jpg", "second/0001.jpg"]
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (["--watch", "--idle-timeout", "-1"], "idle_timeout_s must be at least 0"),
-        (["--watch", "--idle-timeout", "nan"], "idle_timeout_s must be at least 0"),
-        (["--idle-timeout", "3"], "--idle-timeout goes with --watch"),
-        (["--watch", "--order", "time"], "leave --order out"),
-    ],
-)
-def test_mistakes_in_watching_leave_what_is_there(five, tmp_path, capsys, given, message):
-    earlier = tmp_path / "out" / "database.db"
-    earlier.parent.mkdir()
-    earlier.write_text("of an earlier run")
-    try:
-        status = reconstruct(five, tmp_path / "out", "--overwrite", *given)
-    except SystemExit as left:  # As argparse does.
-        status = left.code
-    assert status == 2
-    assert message in capsys.readouterr().err
-    assert earlier.read_text() == "of an earlier run"
-    assert list(earlier.parent.iterdir()) == [earlier]
-
-
-def test_a_file_cannot_be_watched_and_nothing_is_written(five, tmp_path, capsys):
-    assert reconstruct(five / "0001.jpg", tmp_path / "out", *WATCH) == 2
-    assert "not a folder" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
