@@ -45,10 +45,10 @@ def cached_or_fetched(url: str, *, progress: Progress | None = None) -> Path:
             most ``CONNECT_TIMEOUT_S``.
     """
     path = checkpoint_folder() / file_name(url)
-    if path.is_file() and _is_whole(path, url):
-        return path
-    _log.info("fetching %s", url)
     try:
+        if path.is_file() and _is_whole(path, url):
+            return path
+        _log.info("fetching %s", url)
         _download(url, path, progress)
     except (OSError, http.client.HTTPException) as error:
         reason = getattr(error, "reason", None) or error

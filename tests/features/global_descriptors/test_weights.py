@@ -216,3 +216,14 @@ def test_a_server_that_never_answers_is_given_up(checkpoints, monkeypatch):
         with pytest.raises(WeightsError, match=r"did not answer within 0\.2 s"):
             weights_cache.cached_or_fetched(url)
     assert not checkpoints.exists()
+
+
+def test_a_cache_that_may_not_be_read_is_one_clear_line(monkeypatch):
+    """As that of root after ``sudo``."""
+
+    def refuse(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "is_file", refuse)
+    with pytest.raises(WeightsError, match=r"Permission denied.*--weights"):
+        weights_cache.cached_or_fetched("http://127.0.0.1/network-00000000.pth")
