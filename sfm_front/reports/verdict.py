@@ -154,6 +154,11 @@ def _skipped(summary: RunSummary) -> str:
         return ""
     reasons = Counter(photo.reason.value for photo in files)
     reason, count = reasons.most_common(1)[0]
-    mostly = "mostly " if count < len(files) else ""
+    if count == len(files):
+        why = reason
+    elif 2 * count > len(files):
+        why = f"mostly {reason}"
+    else:
+        why = ", ".join(reason for reason, _ in reasons.most_common())
     verb = "was" if len(files) == 1 else "were"
-    return f"{counted(len(files), 'file')} {verb} skipped ({mostly}{reason})"
+    return f"{counted(len(files), 'file')} {verb} skipped ({why})"

@@ -63,7 +63,7 @@ def test_the_summary_says_what_became_of_all():
     ]
     told = [
         "2 of 3 photos are in one model; 1 found no place, because of this: no verified matches; "
-        "2 files were skipped (mostly empty file).",
+        "2 files were skipped (empty file, too small).",
         f"  {Path('out/sparse/0')}: 2 photos, 1234 points, 0.43 px",
         "skipped:",
         "  d.jpg: empty file",

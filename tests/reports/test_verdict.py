@@ -152,3 +152,9 @@ def test_where_no_photo_came_or_none_could_be_read_more_overlap_is_no_advice():
     assert verdict(unread, None).sentence == (
         "No model could be built: no photo could be read; 3 files were skipped (mostly truncated)."
     )
+    # No reason is that of most.
+    skipped["d"] = SkipReason.EMPTY_FILE
+    unread = summary_of(Output(num_photos=0, num_waiting=0, has_model=False, skipped=skipped))
+    assert verdict(unread, None).sentence.endswith(
+        "4 files were skipped (truncated, duplicate, empty file)."
+    )
