@@ -21,10 +21,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Write ``report.html`` into the output; 0 if it was written."""
     from sfm_front.live_page.extra import scene_if_possible
     from sfm_front.reports.html.page import write_page
+    from sfm_front.reports.report_json import read_report
 
-    file = write_page(arguments.output, arguments.photos)
-    print(file if arguments.quiet else f"wrote {file}: open it in a browser")
+    read_report(arguments.output)  # Of a run that has not ended, nothing is made.
     scene = scene_if_possible(arguments.output)
+    file = write_page(arguments.output, arguments.photos)  # Has a link to the scene.
+    print(file if arguments.quiet else f"wrote {file}: open it in a browser")
     if scene is not None and not arguments.quiet:
         print(f"wrote {scene}: the models to turn in a browser")
     return 0

@@ -23,6 +23,7 @@ def test_the_report_command_writes_it_beside_the_page(tmp_path, capsys):
         f"wrote {output / 'report.html'}",
         f"wrote {output / 'scene.html'}",
     ]
+    assert 'href="scene.html"' in (output / "report.html").read_text(encoding="utf-8")
     page = (output / "scene.html").read_text(encoding="utf-8")
     assert "__VISER_EMBED_DATA__" in page
     assert len(page) < 3_000_000

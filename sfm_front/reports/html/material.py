@@ -16,6 +16,7 @@ from sfm_front.georeference.flight_figures import FlightFigures
 from sfm_front.georeference.sidecar import FILE_NAME, Sidecar, read_sidecar
 from sfm_front.photos.source import files_by_name
 from sfm_front.reports import event_log
+from sfm_front.reports.html import SCENE_FILE
 from sfm_front.reports.html.observations import Observations, observations_of
 from sfm_front.reports.report_json import read_report
 from sfm_front.reports.run_summary import RunSummary
@@ -30,7 +31,8 @@ class Material:
     """What lies in ``output``.
 
     ``models`` as ``summary`` has them, the largest first; ``sidecar``: None without positions;
-    ``files``: where photos are, those that were skipped, too, by name. ``began``: day and hour in
+    ``files``: where photos are, those that were skipped, too, by name. ``has_scene``: whether the
+    models to turn lie beside the page. ``began``: day and hour in
     UTC; ``version`` of the program that reconstructed. Both empty where nothing says so.
     """
 
@@ -40,6 +42,7 @@ class Material:
     session: FinishedSession
     sidecar: Sidecar | None
     files: Mapping[str, Path]
+    has_scene: bool = False
     began: str = ""
     version: str = ""
 
@@ -111,6 +114,7 @@ def read_material(output: Path, photos: Path | None = None) -> Material:
         session=session,
         sidecar=read_sidecar(sidecar) if sidecar.is_file() else None,
         files=files,
+        has_scene=(output / SCENE_FILE).is_file(),
         began=began,
         version=version,
     )

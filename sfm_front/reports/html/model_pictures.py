@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import pycolmap
 
+from sfm_front.reports.html import SCENE_FILE
 from sfm_front.reports.html.markup import Html, figure, joined, picture, section, tag
 from sfm_front.reports.html.material import Material
 from sfm_front.reports.html.observations import Observations
@@ -28,7 +29,8 @@ def model_pictures(material: Material) -> tuple[Html, Html] | None:
     """
     if material.observations is None:
         return None
-    first, *sides = _drawn(material.models[0], material.observations, [_FIRST, *_SIDES])
+    link = _scene_link(material)
+    first, *sides = _drawn(material.models[0], material.observations, [_FIRST, *_SIDES], link)
     others = [_other(material, number) for number in range(1, len(material.models))[:_MOST_OTHERS]]
     columns = tag("div", joined([*sides, *others]), class_="columns")
     return first, section("model", "Model", columns)
@@ -41,14 +43,22 @@ def _other(material: Material, number: int) -> Html:
     return drawn
 
 
+def _scene_link(material: Material) -> Html | None:
+    if not material.has_scene:
+        return None
+    return tag("a", "turn it in the browser", href=SCENE_FILE)
+
+
 def _drawn(
     model: pycolmap.Reconstruction,
     observations: Observations,
     sides: Sequence[tuple[str, float, float]],
+    link: Html | None = None,
 ) -> list[Html]:
+    """A figure for each side; ``link`` follows the first caption."""
     scene = build_scene(model)
     width, height = _SIZE
-    figures = []
+    figures: list[Html] = []
     for caption, azimuth_deg, elevation_deg in sides:
         view = choose_view(
             scene.points,
@@ -61,5 +71,6 @@ def _drawn(
         )
         address = picture(draw_scene(scene, view, _SIZE))
         image = tag("img", src=address, alt=f"the model {caption}", width=width, height=height)
-        figures.append(figure(image, caption[0].upper() + caption[1:], class_="model"))
+        says = joined([caption[0].upper() + caption[1:], None if figures else link], by=": ")
+        figures.append(figure(image, says, class_="model"))
     return figures

@@ -242,6 +242,14 @@ def test_an_output_that_is_not_finished_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_the_scene_beside_it_can_be_opened(tmp_path):
+    output = finished_output(tmp_path / "flight")
+    assert "scene.html" not in write_page(output).read_text(encoding="utf-8")
+    (output / "scene.html").touch()
+    page = Reader(write_page(output).read_text(encoding="utf-8"))
+    assert ("a", {"href": "scene.html"}) in page.tags
+
+
 def test_many_photos_that_are_missing_are_folded(tmp_path, monkeypatch):
     monkeypatch.setattr("sfm_front.reports.html.unplaced._OPEN", 2)
     read = Reader(page_of(tmp_path / "out", num_waiting=5))
