@@ -34,8 +34,7 @@ class BackgroundAdjuster(Closeable):
     """
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory(prefix="sfm_front_refinement_")
-        self._model = Path(self._folder.name) / "model"
+        self._folder: TemporaryDirectory[str] | None = None
         self._process: subprocess.Popen[str] | None = None
         self._answers: SimpleQueue[str] = SimpleQueue()
         self._due_s = 0.0
@@ -53,6 +52,7 @@ class BackgroundAdjuster(Closeable):
 
         Returns a ticket for ``result``. It must be free.
         """
+        process = self._running()
         self._model.mkdir(exist_ok=True)
         reconstruction.write_binary(self._model)
         request = AdjustmentRequest(
@@ -64,7 +64,6 @@ class BackgroundAdjuster(Closeable):
             refine_intrinsics=options.refine_intrinsics,
             min_coverage_gain=options.min_coverage_gain,
         )
-        process = self._running()
         assert process.stdin is not None
         try:
             process.stdin.write(json.dumps(asdict(request)) + "\n")
@@ -104,12 +103,19 @@ class BackgroundAdjuster(Closeable):
         if self._process is not None:
             self._process.kill()
             self._process.wait()
-        self._folder.cleanup()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    @property
+    def _model(self) -> Path:
+        assert self._folder is not None
+        return Path(self._folder.name) / "model"
 
     def _running(self) -> subprocess.Popen[str]:
         if self._process is None:
+            self._folder = TemporaryDirectory(prefix="sfm_front_refinement_")
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "sfm_front.mapping.refinement_process"],
+                [sys.executable, "-m", "sfm_front.mapping.refinement_process", self._folder.name],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

@@ -1,15 +1,18 @@
-"""Bundle-adjusts whole models in a process of its own: ``background_refinement`` runs it.
+"""Bundle-adjusts whole models in a process of its own: FOLDER; ``background_refinement`` runs it.
 
 pycolmap holds the interpreter's lock while it adjusts, so that a thread could not do this beside a
 session. Each line of standard input is a request in JSON, answered by a line on standard output.
+FOLDER holds the models, and goes with the session, also with one that was killed.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import zlib  # noqa: F401  (before pycolmap)
+from contextlib import suppress
 from dataclasses import dataclass
 
 import pycolmap
@@ -66,7 +69,7 @@ def _cache_of(reconstruction: pycolmap.Reconstruction) -> pycolmap.DatabaseCache
     return cache
 
 
-def main() -> None:
+def main(folder: str) -> None:
     """Answer requests until standard input ends: with its session."""
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     # Whatever libraries print is not an answer.
@@ -79,8 +82,10 @@ def main() -> None:
             answer = "done"
         except (ValueError, RuntimeError, OSError, TypeError) as error:
             answer = f"failed: {error}".splitlines()[0]
-        print(answer, file=answers, flush=True)
+        with suppress(BrokenPipeError):  # Nobody waits for it any more.
+            print(answer, file=answers, flush=True)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1])

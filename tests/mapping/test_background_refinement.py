@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import tempfile
 import time
 from collections.abc import Iterator
 
@@ -246,3 +247,18 @@ def test_without_the_process_models_are_refined_in_the_turn_of_a_photo(orbit):
     )
     assert refined == of_one
     assert max(refined) > 8
+
+
+def test_the_copies_go_with_a_session_that_is_killed(grown, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with BackgroundAdjuster() as adjuster:
+        assert list(tmp_path.iterdir()) == []
+        adjuster.submit(grown, OPTIONS)
+        process = adjuster._process
+        assert process is not None
+        assert process.stdin is not None
+        assert len(list(tmp_path.iterdir())) == 1
+        # As the system does then.
+        process.stdin.close()
+        assert process.wait(PATIENCE_S) == 0
+        assert list(tmp_path.iterdir()) == []
