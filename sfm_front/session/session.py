@@ -225,8 +225,7 @@ class Session(Closeable):
             self.database.write_skipped(added, path)
             self._parts.report.add(added)
             self._announcer.tell(added)
-        if self._snapshots.is_due:
-            self._write_snapshot()
+        self._write_snapshot_if_due()
         return added
 
     def finish(self) -> SessionResult:
@@ -238,6 +237,7 @@ class Session(Closeable):
         with clock.stage("look again"):
             self._announcer.begin(FinishingStep.LOOK_AGAIN)
             self._placing_more(self._parts.second_look.at_end)
+            self._write_snapshot_if_due()  # It may have placed many, and adjusting takes long.
         with clock.stage("finish"):
             self._placing_more(
                 lambda: finish(
@@ -307,6 +307,10 @@ class Session(Closeable):
         for image_id in sorted(atlas.registered - before):
             self._announcer.tell_placed(atlas, image_id)
         return result
+
+    def _write_snapshot_if_due(self) -> None:
+        if self._snapshots.is_due:
+            self._write_snapshot()
 
     def _write_snapshot(self) -> None:
         self._export(self._parts.georeferencing.sidecar(self._parts.atlas.models))

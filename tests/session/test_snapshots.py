@@ -10,6 +10,7 @@ import pytest
 from helpers.photo_stream import described
 
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
+from sfm_front.events import FinishingBegan, FinishingStep
 from sfm_front.session import snapshots
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
@@ -46,3 +47,29 @@ def test_points_have_their_colours_while_a_session_runs(photos, tmp_path, monkey
             seen = [colors[e.image_id][e.point2D_idx] for e in point.track.elements]
             low, high = np.min(seen, axis=0), np.max(seen, axis=0)
             assert np.all((low <= point.color) & (point.color <= high))
+
+
+def test_what_the_last_look_has_placed_is_written_before_the_last_adjustment(
+    photos, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(snapshots, "_MAX_SHARE", math.inf)
+    told: list[object] = []
+    write = snapshots.Snapshots.write
+
+    def noted(self: snapshots.Snapshots, *args: object, final: bool = False, **given: object):
+        told.append("final" if final else "snapshot")
+        return write(self, *args, final=final, **given)
+
+    monkeypatch.setattr(snapshots.Snapshots, "write", noted)
+    given = options(snapshot_seconds=1e-9)
+    with Session(tmp_path / "out", given, on_event=told.append) as session:
+        for photo in photos[:6]:
+            session.add_extracted(photo)
+        told.clear()
+        session.finish()
+    steps = [one.step if isinstance(one, FinishingBegan) else one for one in told]
+    looked, adjusted = (
+        steps.index(FinishingStep.LOOK_AGAIN),
+        steps.index(FinishingStep.LAST_ADJUSTMENT),
+    )
+    assert looked < steps.index("snapshot") < adjusted < steps.index("final")
