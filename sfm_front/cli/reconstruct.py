@@ -17,7 +17,7 @@ from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct_arguments import add_arguments as add_arguments
 from sfm_front.cli.reconstruct_arguments import session_options
 from sfm_front.cli.result import tell_nothing_to_do, tell_result
-from sfm_front.cli.signals import leaving_at_signal
+from sfm_front.cli.signals import CLOSING, leaving_at_signal
 from sfm_front.errors import InputError
 from sfm_front.events import Listener
 from sfm_front.photos.source import list_photos, order_photos
@@ -125,7 +125,8 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             left = counted(len(new) - taken, "photo")
             print(f"stopped with {left} to go: the same command goes on from there", file=spoken)
     if page is not None:
-        page.stay()
+        with leaving_at_signal(2, CLOSING) as interrupted:
+            page.stay(interrupted)
     return 0 if result.models else 1
 
 

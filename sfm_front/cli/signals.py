@@ -16,6 +16,9 @@ _BY_SIGNAL = 128  # What a shell adds to the number of the signal that ended a p
 INTERRUPTED = _BY_SIGNAL + signal.SIGINT
 """Exit status of a run that Ctrl-C ended at once: 130."""
 
+CLOSING = "closing the live page"
+"""What the user reads where Ctrl-C is how it ends."""
+
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Windows has no SIGHUP.
 _STANDARD_ERROR = 2
 _SA_RESETHAND = 0x80000000

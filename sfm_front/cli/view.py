@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sfm_front import viewers
+from sfm_front.cli.signals import CLOSING, leaving_at_signal
 from sfm_front.errors import InputError
 from sfm_front.storage.colmap_models import is_model
 from sfm_front.viewers.options import BACKGROUNDS, DrawOptions
@@ -83,7 +84,8 @@ def run(args: argparse.Namespace) -> int:
     if args.web:
         from sfm_front.live_page.viewing import serve
 
-        serve(args.model, lambda line: print(line, flush=True))
+        with leaving_at_signal(2, CLOSING) as interrupted:
+            serve(args.model, lambda line: print(line, flush=True), interrupted)
         return 0
     options = DrawOptions(
         width=args.size[0],

@@ -16,6 +16,7 @@ from sfm_front.runtime.subprocess_env import module_environment
 
 # A page that no browser shows ends within this time.
 _ENDING_S = 2.0
+_TICK_S = 0.25
 _STAYS = "the live page stays while a browser shows it; close it there, or press Ctrl-C"
 
 Note = Callable[[str], None]
@@ -31,6 +32,8 @@ class PageBesideSession(Closeable):
         """
         check_installed()
         self._note = note
+        self._output = output
+        self._is_closed = False
         self._process = subprocess.Popen(
             [sys.executable, "-m", "sfm_front.live_page.page_process", str(output), str(port)],
             stdin=subprocess.PIPE,
@@ -48,20 +51,27 @@ class PageBesideSession(Closeable):
         address = self._process.stdout.readline().strip()
         if address:
             self._note(f"live page: {address}")
+        elif not self._is_closed:
+            self._note(f"no live page: sfm-front view {self._output} --web says why")
 
-    def stay(self) -> None:
-        """The session has ended: wait until no browser shows the page any more, or for Ctrl-C."""
+    def stay(self, until: Callable[[], bool]) -> None:
+        """The session has ended: wait until no browser shows the page any more, or ``until``."""
         assert self._process.stdin is not None
         with suppress(OSError):
             self._process.stdin.write("ended\n")
             self._process.stdin.flush()
-        with suppress(subprocess.TimeoutExpired, KeyboardInterrupt):
-            self._process.wait(_ENDING_S)
-            return
-        self._note(_STAYS)
-        with suppress(KeyboardInterrupt):
-            self._process.wait()
+        if not self._has_ended(_ENDING_S):
+            self._note(_STAYS)
+        while not (self._has_ended(_TICK_S) or until()):
+            pass
+
+    def _has_ended(self, within_s: float) -> bool:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(within_s)
+            return True
+        return False
 
     def close(self) -> None:
+        self._is_closed = True
         self._process.kill()
         self._process.wait()

@@ -1,9 +1,8 @@
-"""Show an output in a browser until Ctrl-C."""
+"""Show an output in a browser."""
 
 from __future__ import annotations
 
-import signal
-from contextlib import suppress
+from collections.abc import Callable
 from pathlib import Path
 
 from sfm_front.errors import InputError
@@ -15,12 +14,12 @@ from sfm_front.reports import event_log
 from sfm_front.storage.colmap_models import find_models
 
 
-def serve(place: Path, note: Note, port: int = FIRST_PORT) -> None:
+def serve(place: Path, note: Note, until: Callable[[], bool], port: int = FIRST_PORT) -> None:
     """``place``: the output of a session that runs or is finished, one of its models, or a COLMAP
     model of any program. ``note`` is told the address.
 
-    Returns at Ctrl-C. Raises InputError if there is no such folder or nothing in it to be shown,
-    DependencyError if the page's library is not there.
+    Returns once ``until``. Raises InputError if there is no such folder or nothing in it to be
+    shown, DependencyError if the page's library is not there.
     """
     check_installed()
     if not place.is_dir():
@@ -33,8 +32,6 @@ def serve(place: Path, note: Note, port: int = FIRST_PORT) -> None:
     from sfm_front.live_page.server import LivePage
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
-    with suppress(KeyboardInterrupt), LivePage(output, port) as page:
-        # As Ctrl-C; pycolmap would write a page of its own.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with LivePage(output, port) as page:
         note(f"{page.address} shows {output}; Ctrl-C ends it")
-        page.run(lambda: False)
+        page.run(until)
