@@ -5,10 +5,19 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from sfm_front.cli.terminal import printable
 
 if TYPE_CHECKING:
     from sfm_front.retrieval.retriever import RetrievalOptions
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong without all options before it, among which it would be lost."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, printable(f"{self.prog}: {message}; see {self.prog} --help") + "\n")
 
 
 def add_photos(group: argparse._ActionsContainer) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 
 from sfm_front import __version__
 from sfm_front.cli import explain, export, guide, reconstruct, report, retrieve, view
+from sfm_front.cli.arguments import OneLineParser
 from sfm_front.cli.completion import add_completion
 from sfm_front.cli.logs import add_logging, logging_to
 from sfm_front.cli.signals import INTERRUPTED
@@ -33,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def make_parser() -> argparse.ArgumentParser:
     """That of all commands."""
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="sfm-front", description="Structure-from-Motion that keeps up with the camera."
     )
     parser.add_argument("--version", action="version", version=__version__)
@@ -65,7 +66,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _add(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser],
+    commands: argparse._SubParsersAction[OneLineParser],
     name: str,
     summary: str,
     command: object,
