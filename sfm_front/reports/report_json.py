@@ -82,7 +82,8 @@ def read_report(output: Path) -> RunSummary:
         return _summary(content)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
-            f"{output}: no readable {FILE} in it. Give the output of a finished run."
+            f"{output}: no readable {FILE} in it. Give the output of a finished run; the "
+            "command of one that was interrupted goes on where it stopped."
         ) from error
 
 

@@ -36,7 +36,7 @@ def read_model(folder: Path) -> pycolmap.Reconstruction:
     """
     if not folder.is_dir():
         raise InputError(
-            f"{folder}: no such folder; give one that holds cameras.bin or cameras.txt"
+            f"{folder}: no such folder; give the output of a reconstruction, or a COLMAP model"
         )
     if not is_model(folder):
         raise InputError(f"{folder}: no COLMAP model in it; {_hint(folder)}")
