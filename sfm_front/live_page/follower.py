@@ -11,6 +11,8 @@ from sfm_front.live_page.event_tail import EventTail
 from sfm_front.live_page.model_shapes import ModelReader, Models, ModelShape
 from sfm_front.live_page.story import PhotoState, PhotoStory, Story
 from sfm_front.reports import event_log, report_json
+from sfm_front.reports.run_summary import RunSummary
+from sfm_front.reports.verdict import Verdict, verdict
 from sfm_front.storage.colmap_models import is_model
 
 _GIVEN_UP = "its model was given up"
@@ -32,12 +34,14 @@ class Outcome:
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
     """``models``: those of ``sparse/``. ``fresh``: photos that were placed since these were
-    written, whose poses are in the same frames. ``outcomes`` by name, in order of arrival."""
+    written, whose poses are in the same frames. ``outcomes`` by name, in order of arrival.
+    ``verdict``: once the session has finished."""
 
     story: Story
     models: Sequence[ModelShape]
     fresh: Sequence[PhotoStory]
     outcomes: Mapping[str, Outcome]
+    verdict: Verdict | None = None
 
     def named(self, state: PhotoState) -> list[Outcome]:
         """The photos in this state."""
@@ -64,14 +68,14 @@ class OutputFollower:
         self._reader = ModelReader(output if is_model(output) else output / "sparse")
         self._story = Story()
         self._models = Models([], 0.0)
-        self._hints: dict[str, str] = {}
+        self._summary: RunSummary | None = None
         self._has_looked = False
 
     def look(self) -> Seen | None:
         """What is known now; None if nothing has changed since the last look."""
         events, is_anew = self._tail.new()
         if is_anew:
-            self._story, self._models, self._hints = Story(), Models([], 0.0), {}
+            self._story, self._models, self._summary = Story(), Models([], 0.0), None
         for event in events:
             self._story.tell(event)
         models = self._reader.new()
@@ -80,7 +84,7 @@ class OutputFollower:
         self._has_looked = True
         self._models = models or self._models
         if self._story.ended:
-            self._hints = self._read_hints()
+            self._summary = self._read_summary()
         return self._seen()
 
     def _seen(self) -> Seen:
@@ -104,10 +108,18 @@ class OutputFollower:
         for shape in shapes:  # Of models without events, or whose events are lost.
             for name in shape.names:
                 photos.setdefault(name, PhotoStory(name, PhotoState.PLACED))
-        outcomes = {name: self._outcome(photo, in_model, written) for name, photo in photos.items()}
-        return Seen(self._story, shapes, fresh, outcomes)
+        summary = self._summary
+        hints = {} if summary is None else {photo.name: photo.hint for photo in summary.used}
+        outcomes = {
+            name: self._outcome(photo, in_model, written, hints.get(name, ""))
+            for name, photo in photos.items()
+        }
+        judged = None if summary is None else verdict(summary, summary.sidecar)
+        return Seen(self._story, shapes, fresh, outcomes, judged)
 
-    def _outcome(self, photo: PhotoStory, in_model: Mapping[str, int], written: float) -> Outcome:
+    def _outcome(
+        self, photo: PhotoStory, in_model: Mapping[str, int], written: float, hint: str
+    ) -> Outcome:
         model = in_model.get(photo.name)
         if model is not None:
             linked = sum(in_model.get(name) == model for name in photo.links)
@@ -116,14 +128,12 @@ class OutputFollower:
         if photo.state is PhotoState.PLACED and photo.time > written:
             # The models that hold it are still to be written.
             return Outcome(photo, PhotoState.PLACED, None)
-        hint = self._hints.get(photo.name, "")
         if photo.state is PhotoState.PLACED:
             return Outcome(photo, PhotoState.WAITING, None, _GIVEN_UP, hint)
         return Outcome(photo, photo.state, None, photo.reason, hint)
 
-    def _read_hints(self) -> dict[str, str]:
+    def _read_summary(self) -> RunSummary | None:
         try:
-            used = report_json.read_report(self._report.parent).used
+            return report_json.read_report(self._report.parent)
         except InputError:
-            return {}
-        return {photo.name: photo.hint for photo in used if photo.hint}
+            return None

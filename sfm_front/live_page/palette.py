@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sfm_front.reports.lights import Level
 from sfm_front.types import Uint8Array
 
 Color = tuple[int, int, int]
@@ -21,6 +22,8 @@ WEAK: Color = (249, 115, 22)
 WAITING: Color = (239, 68, 68)
 LINK: Color = (34, 197, 94)
 FAINT: Color = (112, 118, 130)
+OF_LEVEL: dict[Level, Color] = {Level.GOOD: LINK, Level.FAIR: NEWEST, Level.BAD: WAITING}
+"""Of verdicts, which are one of these."""
 
 
 def of_model(number: int) -> Color:

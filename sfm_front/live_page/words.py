@@ -12,6 +12,7 @@ from sfm_front.live_page.follower import Seen
 from sfm_front.live_page.markup_parts import PADDED, ROW, SCROLL, dot, what_became
 from sfm_front.live_page.story import PhotoState
 from sfm_front.reports.html.markup import Html, joined, tag
+from sfm_front.reports.verdict import Verdict
 from sfm_front.reports.words import clock, counted
 
 _MOST_EVENTS = 14
@@ -48,6 +49,7 @@ def headline(seen: Seen, now: float | None = None) -> Html:
     return tag(
         "div",
         tag("div", _status(seen, time.time() if now is None else now), style="margin-bottom:.5em"),
+        _verdict(seen.verdict),
         tag("div", *tiles, style="display:flex;flex-wrap:wrap;gap:.4em"),
         tag(
             "div",
@@ -56,6 +58,13 @@ def headline(seen: Seen, now: float | None = None) -> Html:
         ),
         style="padding:.6em .8em .4em",
     )
+
+
+def _verdict(found: Verdict | None) -> Html | None:
+    if found is None:
+        return None
+    says = dot(palette.OF_LEVEL[found.level], found.sentence)
+    return tag("div", says, style="margin-bottom:.6em;font-size:.85em;line-height:1.4")
 
 
 def _status(seen: Seen, now: float) -> Html:

@@ -71,6 +71,8 @@ def test_a_real_session_is_told_as_it_was(tmp_path):
     output = run_session(tmp_path / "out", photos_of(scene, tmp_path / "photos", {2: HOSTILE}))
     seen = OutputFollower(output).look()
     assert seen.story.ended is True
+    assert seen.verdict is not None
+    assert seen.verdict.sentence.startswith(f"All {NUM_PHOTOS} photos are in one model")
     assert [len(shape.image_ids) for shape in seen.models] == [NUM_PHOTOS]
     assert len(seen.outcomes) == NUM_PHOTOS
     assert {one.state for one in seen.outcomes.values()} == {PhotoState.PLACED}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 from helpers.live_session import HOSTILE
@@ -11,6 +12,8 @@ from sfm_front.live_page import photo_words, words
 from sfm_front.live_page.event_words import in_words
 from sfm_front.live_page.follower import Outcome, Seen
 from sfm_front.live_page.story import PhotoState, PhotoStory, Story
+from sfm_front.reports.lights import Level
+from sfm_front.reports.verdict import Verdict
 
 
 def seen(*, ended: bool | None = None, **counts: int) -> Seen:
@@ -80,6 +83,14 @@ def test_the_headline_counts():
 )
 def test_the_headline_says_how_it_stands(ended, now, expected):
     assert expected in " ".join(text_of(words.headline(seen(ended=ended), now)).split())
+
+
+@pytest.mark.parametrize("level", [Level.GOOD, Level.FAIR, Level.BAD])
+def test_the_verdict_is_text(level):
+    judged = replace(seen(ended=True), verdict=Verdict(level, f"All are in. {HOSTILE}"))
+    markup = words.headline(judged)
+    assert "All are in." in text_of(markup)
+    assert "<img" not in markup
 
 
 def test_long_lists_keep_what_is_not_placed():
