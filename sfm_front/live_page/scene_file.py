@@ -15,6 +15,7 @@ from sfm_front.live_page.follower import OutputFollower
 from sfm_front.live_page.scene_drawing import SceneDrawing
 from sfm_front.live_page.scenery import SceneMaker
 from sfm_front.reports.html import SCENE_FILE
+from sfm_front.reports.html.markup import tag
 from sfm_front.storage.atomic import write_atomically
 
 
@@ -36,6 +37,8 @@ def write_scene(output: Path) -> Path:
     finally:
         with redirect_stdout(io.StringIO()):
             server.stop()
+    title = tag("title", output.resolve().name)
+    page = page.replace("<title>Viser</title>", title, 1)
     file = output / SCENE_FILE
     write_atomically(file, lambda new: new.write(page.encode()))
     return file

@@ -37,7 +37,7 @@ def headline(seen: Seen, now: float | None = None) -> Html:
     ]
     recent = [sum(one.photo.seconds.values()) for one in taken if one.photo.seconds][-20:]
     if recent:
-        tiles.append(_tile(f"{sorted(recent)[len(recent) // 2]:.2f} s", "of work a photo"))
+        tiles.append(_tile(f"{sorted(recent)[len(recent) // 2]:.2f} s", "work a photo"))
     waiting, skipped = seen.named(PhotoState.WAITING), seen.named(PhotoState.SKIPPED)
     queued = seen.named(PhotoState.ARRIVED)
     notes = [

@@ -16,7 +16,7 @@ needs_viser = pytest.mark.skipif(not is_installed(), reason="needs viser: pip in
 
 @needs_viser
 def test_the_report_command_writes_it_beside_the_page(tmp_path, capsys):
-    output = run_session(tmp_path / "out", photos_of(orbit(12), tmp_path / "photos"))
+    output = run_session(tmp_path / "<b> out", photos_of(orbit(12), tmp_path / "photos"))
     assert main(["report", str(output)]) == 0
     said = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in said] == [
@@ -26,6 +26,7 @@ def test_the_report_command_writes_it_beside_the_page(tmp_path, capsys):
     assert 'href="scene.html"' in (output / "report.html").read_text(encoding="utf-8")
     page = (output / "scene.html").read_text(encoding="utf-8")
     assert "__VISER_EMBED_DATA__" in page
+    assert "<title>&lt;b&gt; out</title>" in page
     assert len(page) < 3_000_000
     # Another session may take its place.
     run = ["reconstruct", str(tmp_path / "photos"), "--output", str(output), "--overwrite"]
