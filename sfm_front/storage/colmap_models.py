@@ -55,6 +55,8 @@ def _by_number(folder: Path) -> list[tuple[int, str]]:
 
 def _hint(folder: Path) -> str:
     below = find_models(folder)
+    if (folder / "database.db").is_file() and not below:
+        return "its session has built none so far; the same reconstruct command goes on"
     if not below:
         return "expected cameras, images and points3D, all .bin or all .txt"
     shown = ", ".join(str(path) for path in below[:5])

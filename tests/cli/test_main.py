@@ -281,6 +281,20 @@ def test_a_model_to_view_that_is_missing(tmp_path, capsys):
     assert line.startswith(f"sfm-front view: {tmp_path / 'none'}: no such folder")
 
 
+def test_a_session_without_a_model_yet(tmp_path, capsys):
+    (tmp_path / "database.db").touch()
+    line = refused(capsys, "view", tmp_path)
+    assert line.endswith("the same reconstruct command goes on")
+
+
+def test_what_a_command_does_not_know_leads_to_its_own_help(capsys):
+    with pytest.raises(SystemExit):
+        main(["view", "outputs/a", "--nosuch\x1b"])
+    assert capsys.readouterr().err == (
+        "sfm-front view: unrecognized arguments: --nosuch\\x1b; see sfm-front view --help\n"
+    )
+
+
 @pytest.mark.parametrize("arguments", [[], ["rebuild"], ["reconstruct"], ["reconstruct", "a", "b"]])
 def test_what_is_no_command_is_status_2(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
