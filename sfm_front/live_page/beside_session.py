@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,7 +11,7 @@ from threading import Thread
 from sfm_front.live_page.address import FIRST_PORT
 from sfm_front.live_page.extra import check_installed
 from sfm_front.runtime.closeable import Closeable
-from sfm_front.runtime.subprocess_env import module_environment
+from sfm_front.runtime.subprocess_env import module_command, module_environment
 
 # A page that no browser shows ends within this time.
 _ENDING_S = 2.0
@@ -35,7 +34,7 @@ class PageBesideSession(Closeable):
         self._output = output
         self._is_closed = False
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "sfm_front.live_page.page_process", str(output), str(port)],
+            module_command("sfm_front.live_page.page_process", str(output), str(port)),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 import subprocess
-import sys
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -18,7 +17,7 @@ import pycolmap
 from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.refinement_process import AdjustmentRequest
 from sfm_front.runtime.closeable import Closeable
-from sfm_front.runtime.subprocess_env import module_environment
+from sfm_front.runtime.subprocess_env import module_command, module_environment
 
 logger = logging.getLogger(__name__)
 
@@ -115,7 +114,7 @@ class BackgroundAdjuster(Closeable):
         if self._process is None:
             self._folder = TemporaryDirectory(prefix="sfm_front_refinement_")
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "sfm_front.mapping.refinement_process", self._folder.name],
+                module_command("sfm_front.mapping.refinement_process", self._folder.name),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

@@ -7,14 +7,13 @@ of raising, and it prints to standard output.
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from sfm_front.errors import DependencyError, InputError
-from sfm_front.runtime.subprocess_env import module_environment
+from sfm_front.runtime.subprocess_env import module_command, module_environment
 from sfm_front.viewers.model_drawing import Scene
 from sfm_front.viewers.open3d_loader import INSTALL_HINT
 from sfm_front.viewers.options import BACKGROUNDS, DrawOptions
@@ -58,7 +57,7 @@ def render_png(scene: Scene, options: DrawOptions, out: Path) -> None:
 
 
 def _draw(drawing: Path, picture: Path) -> None:
-    command = [sys.executable, "-m", "sfm_front.viewers.offscreen_process"]
+    command = module_command("sfm_front.viewers.offscreen_process")
     try:
         done = subprocess.run(
             [*command, str(drawing), str(picture)],

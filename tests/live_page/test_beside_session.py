@@ -63,7 +63,7 @@ def test_while_a_browser_shows_it_it_stays_until_ctrl_c(tmp_path, monkeypatch):
 
 
 def test_a_page_that_cannot_start_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(beside_session.sys, "executable", shutil.which("false"))
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
     said: list[str] = []
     with PageBesideSession(tmp_path / "out", said.append, 18280):
         wait_for(lambda: len(said) == 1)
