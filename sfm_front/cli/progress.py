@@ -13,6 +13,15 @@ from sfm_front.reports.words import clock, counted
 from sfm_front.types import Skipped
 
 
+# Photos without a place for any of them after which one wonders: most models start with three or
+# four, streets with ten.
+_WONDER_AFTER = 12
+_NONE_YET = (
+    "no photo is placed yet: a model starts with two that see the same from clearly different "
+    "places; they wait, and are tried again"
+)
+
+
 class LiveLine:
     """A line that renews itself on a terminal; a line each time anywhere else.
 
@@ -62,6 +71,7 @@ class ProgressLine(LiveLine):
         self._total = 0
         self._started = time.perf_counter()
         self._done = 0
+        self._added = 0
         self._placed = 0
         self._points = 0
         self._is_finishing = False
@@ -84,6 +94,9 @@ class ProgressLine(LiveLine):
             self.note(f"skipped {event.name}: {event}")
         elif isinstance(event, PhotoAdded):
             self._placed, self._points = event.num_registered, event.num_points
+            self._added += 1
+            if self._added == _WONDER_AFTER and not self._placed:
+                self.note(_NONE_YET)
         else:
             return
         self._done += 1

@@ -46,6 +46,15 @@ def placed(name: str, registered: int, points: int) -> PhotoAdded:
     return PhotoAdded(name, image_id=1, num_registered=registered, num_points=points)
 
 
+@pytest.mark.parametrize(("placed_at_last", "told"), [(0, 1), (2, 0)])
+def test_photos_that_all_wait_are_explained_once(placed_at_last, told):
+    stream = io.StringIO()
+    line = expecting(30, stream)
+    for number in range(25):
+        line.show(placed(f"{number}.jpg", placed_at_last if number > 10 else 0, 0))
+    assert stream.getvalue().count("no photo is placed yet") == told
+
+
 def test_without_a_terminal_there_is_a_line_a_photo(turn):
     stream = io.StringIO()
     line = expecting(4, stream)
