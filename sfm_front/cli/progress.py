@@ -12,7 +12,6 @@ from sfm_front.events import ControlPointsRefused, Event, FinishingBegan, PhotoA
 from sfm_front.reports.words import clock, counted
 from sfm_front.types import Skipped
 
-
 # Photos without a place for any of them after which one wonders: most models start with three or
 # four, streets with ten.
 _WONDER_AFTER = 12
