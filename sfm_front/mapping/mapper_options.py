@@ -70,10 +70,12 @@ class ConvergenceOptions:
     large_final_tolerance: float = 1e-6
     # That from which the robust adjustment of a model that is not large goes on, at the end.
     last_tolerance: float = 3e-5
+    # Share of the observations from which that refinement goes on to another round.
+    last_change: float = 5e-3
 
     def __post_init__(self) -> None:
         for name in vars(self):
-            least = 0 if name.endswith("tolerance") else 1
+            least = 0 if name.endswith(("tolerance", "change")) else 1
             if getattr(self, name) < least:
                 raise ConfigError(f"{name} must be at least {least}, got {getattr(self, name)}")
 
@@ -141,7 +143,7 @@ class MapperOptions:
         """The same before the robust adjustment at the end: it need not converge
         (TUNING: last-refinement)."""
         options = self.final(num_photos)
-        options.ba_global_max_refinements = 1
+        options.ba_global_max_refinement_change = self.convergence.last_change
         if num_photos < self.schedule.large_from:
             options.ba_global_function_tolerance = self.convergence.last_tolerance
         return options

@@ -236,6 +236,7 @@ def test_the_options_reach_pycolmap():
         final_tolerance=1e-7,
         large_final_tolerance=1e-8,
         last_tolerance=1e-5,
+        last_change=0.02,
     )
     options = MapperOptions(
         convergence=convergence,
@@ -253,7 +254,8 @@ def test_the_options_reach_pycolmap():
     assert final.ceres.solver_options.function_tolerance == 1e-7
     assert large.ceres.solver_options.function_tolerance == 1e-8
     last, large_last = options.last(49), options.last(50)
-    assert last.ba_global_max_refinements == large_last.ba_global_max_refinements == 1
+    changes = {each.ba_global_max_refinement_change for each in (last, large_last)}
+    assert changes == {0.02}
     assert last.ba_global_function_tolerance == 1e-5
     assert large_last.ba_global_function_tolerance == 1e-8
     robust = options.robust
