@@ -74,6 +74,8 @@ class ProgressLine(LiveLine):
         self._placed = 0
         self._points = 0
         self._is_finishing = False
+        self._counts = True
+        self._said = ""
         self._heartbeat = Heartbeat(stream)
 
     def expect(self, total: int) -> None:
@@ -99,12 +101,21 @@ class ProgressLine(LiveLine):
         else:
             return
         self._done += 1
+        if not self._counts:
+            return
         # Nobody knows how many are still to come if a folder is watched.
         of = f" of {self._total}" if self._total else ""
         pace = f"  {_pace(self._started, self._done, self._total)}" if self._total else ""
         self._write(
             f"photo {self._done}{of}: {self._placed} placed, {counted(self._points, 'point')}{pace}"
         )
+
+    def say(self, text: str) -> None:
+        """In place of the count of photos, from the first call on."""
+        self._counts = False
+        if text != self._said:
+            self._said = text
+            self._write(text)
 
     def step(self, what: str) -> None:
         """A step of the end begins."""

@@ -24,6 +24,7 @@ from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.words import counted
 
 if TYPE_CHECKING:
+    from sfm_front.cli.cluster_run import ClusterRun
     from sfm_front.live_page.beside_session import PageBesideSession
     from sfm_front.session.options import SessionOptions
     from sfm_front.types import NotYet, PhotoPath
@@ -49,6 +50,10 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         arguments.usage_error("--idle-timeout goes with --watch")
     if arguments.order != "name" and arguments.watch:
         arguments.usage_error("--watch takes photos as they come: leave --order out")
+    if arguments.cluster is not None and arguments.watch:
+        arguments.usage_error("--watch takes photos as they come: leave --cluster out")
+    if arguments.group_size is not None and arguments.cluster is None:
+        arguments.usage_error("--group-size goes with --cluster")
     if arguments.events and arguments.json:
         arguments.usage_error("--events and --json both take standard output: leave one out")
     import pycolmap
@@ -85,7 +90,13 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         on_event = _event_printer() if arguments.events else progress.show
         # Also with --quiet: nobody finds the page without its address.
         page = _page(output, progress.keep, opened) if arguments.viewer else None
-        session = Session(
+        cluster: ClusterRun | None = None
+        if arguments.cluster is not None:
+            from sfm_front.cli.cluster_run import ClusterRun
+            from sfm_front.session.given import GivenSession
+
+            cluster = opened.enter_context(ClusterRun(arguments, progress))
+        session = (Session if cluster is None else GivenSession)(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
         )
     with session, closing(progress), leaving_at_signal(2, _STOPPING) as interrupted:
@@ -110,12 +121,16 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             new = list(newcomers.among(photos, progress.note))
             progress.expect(len(new))
             arriving = new
-        taken = 0
-        for _ in session.add_all(arriving):
-            taken += 1
-            if interrupted():
-                break
-        result = session.finish()
+        if cluster is not None:
+            assert isinstance(session, GivenSession)
+            result, taken = cluster.reconstruct(session, new, interrupted)
+        else:
+            taken = 0
+            for _ in session.add_all(arriving):
+                taken += 1
+                if interrupted():
+                    break
+            result = session.finish()
         progress.step("drawing the page")
         scene_if_possible(output)
         write_page(output)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pycolmap
 
@@ -116,6 +116,21 @@ class Atlas:
                 )
             )
         self.initializer.go_on_after(max((model.model_id for model in self.models), default=0))
+
+    def take_model(self, reconstruction: pycolmap.Reconstruction, state: ModelState) -> None:
+        """Take in one that was grown elsewhere over the same photos; it gets an id of its own.
+
+        It is joined to others when they grow."""
+        model = Model.restored(
+            self.view_graph,
+            self.options.mapper,
+            reconstruction,
+            replace(state, model_id=self.initializer.next_id()),
+            self.emit,
+            self._adjuster,
+        )
+        self.models.append(model)
+        self.drop_covered()
 
     @property
     def registered(self) -> set[int]:

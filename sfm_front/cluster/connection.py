@@ -1,0 +1,147 @@
+"""The client of a Dask cluster, which is started here or runs already."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any
+
+from sfm_front.cluster.identity import identity
+from sfm_front.cluster.options import ClusterOptions, check_installed
+from sfm_front.errors import ConfigError, InputError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+# A scheduler that does not answer within this time is not there.
+_CONNECT_S = 10
+# How long the first worker may be waited for.
+_FIRST_WORKER_S = 60
+# pycolmap holds the interpreter's lock while it adjusts: a worker says nothing meanwhile.
+_SILENT = "60 minutes"
+_ASK = "__import__('sfm_front.cluster.identity', fromlist=['identity']).identity()"
+
+
+class Cluster:
+    """Workers that have this package, and no others: those that join later are looked at, too."""
+
+    def __init__(self, client: Client, address: str, note: Callable[[str], None]) -> None:
+        self.client = client
+        self.address = address
+        self._note = note
+        self._known: set[str] = set()
+
+    @property
+    def dashboard(self) -> str | None:
+        """Dask's own page; None without bokeh."""
+        link: str | None = self.client.dashboard_link
+        return link
+
+    def num_threads(self) -> int:
+        """Tasks that can run at once."""
+        workers: dict[str, Any] = self.client.scheduler_info(n_workers=-1)["workers"]
+        return sum(int(worker["nthreads"]) for worker in workers.values())
+
+    def check_workers(self) -> None:
+        """Look at workers that are new; those with another package are sent away, with a line."""
+        new = self._workers() - self._known
+        if not new:
+            return
+        self._known |= new
+        for address, found in self._ask(new).items():
+            if found != identity():
+                self.refuse(address, found)
+
+    def refuse(self, address: str, found: str) -> None:
+        """Send a worker away that has another package."""
+        self._note(f"worker {address} is refused: it has {found}, this is {identity()}")
+        self.client.retire_workers([address], close_workers=True)
+
+    def require_workers(self) -> None:
+        """Wait for the first one. Raises InputError if none comes, ConfigError if one that is
+        there has another package."""
+        try:
+            self.client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
+        except TimeoutError as error:
+            raise InputError(
+                f"{self.address}: no worker has come in {_FIRST_WORKER_S} s. Start some with "
+                f"dask worker {self.address} --nthreads 1"
+            ) from error
+        self._known |= self._workers()
+        for address, found in self._ask(self._known).items():
+            if found != identity():
+                raise ConfigError(
+                    f"worker {address} has {found}, this is {identity()}. Install the same there."
+                )
+
+    def _workers(self) -> set[str]:
+        return set(self.client.scheduler_info(n_workers=-1)["workers"])
+
+    def _ask(self, addresses: Iterable[str]) -> dict[str, str]:
+        """What each has for this package; in words, if it has none."""
+        # What is run is found by any Python: a worker without the package can answer.
+        found = self.client.run(eval, _ASK, workers=list(addresses), on_error="return")
+        return {
+            address: f"no sfm-front ({answer})" if isinstance(answer, BaseException) else answer
+            for address, answer in found.items()
+        }
+
+
+@contextmanager
+def connected(options: ClusterOptions, note: Callable[[str], None]) -> Iterator[Cluster]:
+    """The cluster, ready to work; ``note`` hears in one line each of what the user should know.
+
+    Raises DependencyError without the extra; InputError if nothing answers at the address, or no
+    worker is there; ConfigError if a worker has another package.
+    """
+    check_installed()
+    import dask
+    from distributed import Client
+
+    for name in ("distributed", "tornado"):
+        # Each death of a worker would be told with a traceback; ours is a line.
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    with ExitStack() as opened:
+        opened.enter_context(dask.config.set(_config(options)))
+        target: Any = options.address
+        if options.num_local is not None:
+            target = opened.enter_context(_local_cluster(options.num_local))
+        try:
+            client = opened.enter_context(
+                Client(target, timeout=_CONNECT_S, direct_to_workers=True, set_as_default=False)
+            )
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"{options.address}: no Dask scheduler answers there. Start one with dask "
+                "scheduler, or give --cluster local:N."
+            ) from error
+        cluster = Cluster(client, client.scheduler.address, note)
+        cluster.require_workers()
+        yield cluster
+
+
+def _config(options: ClusterOptions) -> dict[str, Any]:
+    """Of this process, and of the scheduler and workers that it starts."""
+    config: dict[str, Any] = {
+        "distributed.scheduler.worker-ttl": _SILENT,
+        # Deaths of workers in a task before it is given up, one less than attempts.
+        "distributed.scheduler.allowed-failures": options.attempts - 1,
+        "distributed.admin.tick.limit": "10 minutes",
+    }
+    if options.num_local is not None:
+        config["distributed.comm.timeouts.connect"] = "10 minutes"
+    return config
+
+
+def _local_cluster(num_workers: int) -> Any:
+    from distributed import LocalCluster
+
+    return LocalCluster(
+        n_workers=num_workers,
+        threads_per_worker=1,
+        processes=True,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        silence_logs=logging.CRITICAL,
+    )

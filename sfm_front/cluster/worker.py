@@ -1,0 +1,76 @@
+"""The worker's side of a task: unpack, do it with what a session is made of, count, pack."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from threading import Lock
+from typing import Any
+
+from sfm_front.cluster.describing import describe
+from sfm_front.cluster.growing import grow
+from sfm_front.cluster.identity import identity, worker_name
+from sfm_front.cluster.matching import match
+from sfm_front.cluster.work import (
+    DESCRIBE,
+    GROW,
+    MATCH,
+    Answer,
+    RunSettings,
+    WrongVersionError,
+    pack,
+    unpack,
+)
+from sfm_front.cluster.workbench import Counts, Workbench
+from sfm_front.runtime.thread_limits import limit_this_thread, single_threaded_calls
+
+_DO: Mapping[str, Callable[[Workbench, Any, Counts], Any]] = {
+    DESCRIBE: describe,
+    MATCH: match,
+    GROW: grow,
+}
+
+
+def run(kind: str, parcel: bytes) -> Answer:
+    """Raises WrongVersionError if this is not the coordinator's package."""
+    settings: RunSettings
+    settings, work = unpack(parcel)
+    if settings.identity != identity():
+        raise WrongVersionError(_address(), identity())
+    started, began, cpu = time.time(), time.perf_counter(), time.process_time()
+    limit_this_thread()
+    counts = Counts(bytes_in=len(parcel))
+    with single_threaded_calls(opencv=True):
+        result = pack(_DO[kind](_workbench(settings), unpack(work), counts))
+    return Answer(
+        result=result,
+        worker=worker_name(),
+        started=started,
+        seconds=time.perf_counter() - began,
+        cpu_seconds=time.process_time() - cpu,
+        items=counts.items,
+        reused=counts.reused,
+        bytes_in=counts.bytes_in,
+        bytes_out=counts.bytes_out + len(result),
+    )
+
+
+def _workbench(settings: RunSettings) -> Workbench:
+    """What the tasks of one run share; that of an earlier run is put away."""
+    global _current
+    with _lock:
+        if _current is None or _current.settings.run_id != settings.run_id:
+            if _current is not None:
+                _current.close()
+            _current = Workbench(settings)
+        return _current
+
+
+def _address() -> str:
+    from distributed import get_worker
+
+    return str(get_worker().address)
+
+
+_lock = Lock()
+_current: Workbench | None = None
