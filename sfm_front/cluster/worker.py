@@ -56,12 +56,11 @@ def run(kind: str, parcel: bytes) -> Answer:
 
 
 def _workbench(settings: RunSettings) -> Workbench:
-    """What the tasks of one run share; that of an earlier run is put away."""
+    """What the tasks of one run share. That of an earlier run goes once no task holds it: the last
+    one of a coordinator that died may still run."""
     global _current
     with _lock:
         if _current is None or _current.settings.run_id != settings.run_id:
-            if _current is not None:
-                _current.close()
             _current = Workbench(settings)
         return _current
 
