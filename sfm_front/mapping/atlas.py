@@ -171,12 +171,16 @@ class Atlas:
         Returns the image ids that are in some model now and were in none before.
         """
         before = self.registered
-        for model in self.models:
-            model.extend(image_id)
+        self.know(image_id)
         self.grow()
         if image_id in self.waiting:
             self._start_near(image_id)
         return sorted(self.registered - before)
+
+    def know(self, image_id: int) -> None:
+        """Make a photo of the view graph known to the models, without placing it."""
+        for model in self.models:
+            model.extend(image_id)
 
     def take_pairs(self, pairs: Sequence[PairGeometry]) -> None:
         """Take in pairs of photos that are there already, and place all that can be placed."""

@@ -51,7 +51,8 @@ class GivenSession(Session):
         snapshot = read_snapshot(self.output / "sparse") if whole else None
         restore(self._parts, snapshot, self._announcer, grow=False)
 
-    def _map(self, _image_id: int, /) -> list[int]:
+    def _map(self, image_id: int, /) -> list[int]:
+        self._parts.atlas.know(image_id)
         return []  # it waits for the model of its group
 
     @property
