@@ -45,7 +45,7 @@ class ClusterRun(Closeable):
         cannot be used."""
         cluster = self._connecting.result()
         page = f", dashboard: {cluster.dashboard}" if cluster.dashboard else ""
-        workers = counted(cluster.num_threads(), "worker")
+        workers = counted(cluster.num_threads, "worker")
         self._progress.note(f"{workers} at {cluster.address}{page}")
 
     def reconstruct(

@@ -10,7 +10,6 @@ from sfm_front.cluster.connection import Cluster
 from sfm_front.cluster.features import FeatureStore
 from sfm_front.cluster.figures import Figures
 from sfm_front.cluster.group_stage import GroupStage
-from sfm_front.cluster.identity import identity
 from sfm_front.cluster.options import ClusterOptions
 from sfm_front.cluster.photo_stage import PhotoStage
 from sfm_front.cluster.storage_probe import all_see_photo, all_see_token
@@ -70,7 +69,6 @@ class Coordinator:
             sees_photos = not photos or all_see_photo(cluster, photos[0].path)
         settings = RunSettings(
             run_id=uuid4().hex,
-            identity=identity(),
             # By its parts: auto might find other weights on another machine.
             options=replace(session.options, global_descriptor=descriptor.name, threads=1),
             descriptor=descriptor.fingerprint,

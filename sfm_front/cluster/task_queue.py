@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
@@ -12,7 +13,7 @@ from uuid import uuid4
 from sfm_front.cluster.connection import Cluster
 from sfm_front.cluster.entry import run_task
 from sfm_front.cluster.figures import Figures
-from sfm_front.cluster.work import Answer, RunSettings, WrongVersionError, pack, unpack
+from sfm_front.cluster.work import Answer, RunSettings, pack, unpack
 from sfm_front.errors import InputError
 from sfm_front.runtime.closeable import Closeable
 
@@ -37,6 +38,7 @@ class Task:
     failed: Callable[[str], None]
     attempts: int = 0
     key: str = ""
+    workers: frozenset[str] = frozenset()
     held: list[Any] = field(default_factory=list)
 
 
@@ -53,12 +55,13 @@ class TaskQueue(Closeable):
         self._under_way: dict[str, Task] = {}
         self._ended: SimpleQueue[Future[Any]] = SimpleQueue()
         self._looked = time.monotonic()
-        self._threads = max(1, cluster.num_threads())
+        # Of each kind of which none has succeeded yet.
+        self._given_up: Counter[str] = Counter()
 
     @property
     def num_threads(self) -> int:
-        """Tasks that can run at once."""
-        return self._threads
+        """Tasks that can run at once; one, while all workers are away."""
+        return max(1, self._cluster.num_threads)
 
     @property
     def num_under_way(self) -> int:
@@ -68,7 +71,7 @@ class TaskQueue(Closeable):
     @property
     def is_full(self) -> bool:
         """Whether each worker has a task, and the next one is there when that ends."""
-        return len(self._under_way) >= 2 * self._threads
+        return len(self._under_way) >= 2 * self.num_threads
 
     def submit(self, task: Task) -> None:
         """Hand it out."""
@@ -77,12 +80,13 @@ class TaskQueue(Closeable):
         task.attempts += 1
         parcel = pack((self._settings, pack(task.work())))
         task.key = f"{task.kind}-{uuid4().hex}"
-        client = self._cluster.client
+        client, task.workers = self._cluster.client, self._cluster.workers
+        where: dict[str, Any] = {"workers": list(task.workers)}
         sent: Any = parcel
         try:
             if len(parcel) > _LARGE:
-                sent = client.scatter(parcel, direct=True, hash=False)
-            future = client.submit(run_task, task.kind, sent, key=task.key, pure=False)
+                sent = client.scatter(parcel, direct=True, hash=False, **where)
+            future = client.submit(run_task, task.kind, sent, key=task.key, pure=False, **where)
         except (OSError, CancelledError, TimeoutError) as error:
             raise self._gone() from error
         task.held = [sent, future]
@@ -122,21 +126,26 @@ class TaskQueue(Closeable):
         client = self._cluster.client
         if client.status != "running":
             raise self._gone()
-        self._cluster.check_workers()
-        self._threads = max(1, self._cluster.num_threads())
+        self._cluster.look()
+        there = self._cluster.workers
+        if not there:
+            return
+        for task in [task for task in self._under_way.values() if not task.workers & there]:
+            # All those that it may run on are gone; others have come.
+            del self._under_way[task.key]
+            self.figures.end()
+            client.cancel([task.held[-1]], force=True)
+            task.attempts -= 1
+            self.submit(task)
 
     def _take(self, task: Task, future: Future[Any]) -> None:
         from distributed import CancelledError, KilledWorker
 
         try:
             answer: Answer = self._cluster.client.gather(future, direct=True)
-        except WrongVersionError as error:
-            self._cluster.refuse(error.address, error.found)
-            task.attempts -= 1  # nobody has tried it
-            self.submit(task)
-            return
         except KilledWorker:
-            task.failed("the workers that had it died")
+            self.figures.lost += 1
+            self._give_up(task, "the workers that had it died")
             return
         except CancelledError as error:
             if self._cluster.client.status != "running":
@@ -154,7 +163,16 @@ class TaskQueue(Closeable):
         if task.attempts < self._attempts:
             self.submit(task)
         else:
-            task.failed(reason)
+            self._give_up(task, reason)
+
+    def _give_up(self, task: Task, reason: str) -> None:
+        if self.figures.mean_seconds(task.kind) is None:
+            self._given_up[task.kind] += 1
+            if self._given_up[task.kind] >= self._attempts:
+                raise InputError(
+                    f"no worker of {self._cluster.address} can {task.kind} photos: {reason}"
+                )
+        task.failed(reason)
 
     def _gone(self) -> InputError:
         return InputError(

@@ -30,12 +30,11 @@ DESCRIBE, MATCH, GROW = "describe", "match", "grow"
 class RunSettings:
     """The same for all tasks of a run.
 
-    ``identity`` of the coordinator's package; ``descriptor``: fingerprint of its global descriptor;
+    ``descriptor``: fingerprint of its global descriptor;
     ``cache``: the folder of features if workers see it too, else None.
     """
 
     run_id: str
-    identity: str
     options: SessionOptions
     descriptor: str
     cache: Path | None
@@ -139,15 +138,6 @@ class Answer:
     reused: int
     bytes_in: int
     bytes_out: int
-
-
-class WrongVersionError(Exception):
-    """A worker has other code than the coordinator: its address, and which."""
-
-    def __init__(self, address: str, found: str) -> None:
-        super().__init__(address, found)
-        self.address = address
-        self.found = found
 
 
 def pack(value: Any) -> bytes:

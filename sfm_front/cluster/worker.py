@@ -9,7 +9,7 @@ from typing import Any
 
 from sfm_front.cluster.describing import describe
 from sfm_front.cluster.growing import grow
-from sfm_front.cluster.identity import identity, worker_name
+from sfm_front.cluster.identity import worker_name
 from sfm_front.cluster.matching import match
 from sfm_front.cluster.work import (
     DESCRIBE,
@@ -17,7 +17,6 @@ from sfm_front.cluster.work import (
     MATCH,
     Answer,
     RunSettings,
-    WrongVersionError,
     pack,
     unpack,
 )
@@ -32,11 +31,9 @@ _DO: Mapping[str, Callable[[Workbench, Any, Counts], Any]] = {
 
 
 def run(kind: str, parcel: bytes) -> Answer:
-    """Raises WrongVersionError if this is not the coordinator's package."""
+    """On the thread that Dask calls."""
     settings: RunSettings
     settings, work = unpack(parcel)
-    if settings.identity != identity():
-        raise WrongVersionError(_address(), identity())
     started, began, cpu = time.time(), time.perf_counter(), time.process_time()
     limit_this_thread()
     counts = Counts(bytes_in=len(parcel))
@@ -63,12 +60,6 @@ def _workbench(settings: RunSettings) -> Workbench:
         if _current is None or _current.settings.run_id != settings.run_id:
             _current = Workbench(settings)
         return _current
-
-
-def _address() -> str:
-    from distributed import get_worker
-
-    return str(get_worker().address)
 
 
 _lock = Lock()

@@ -24,4 +24,6 @@ def threads() -> Iterator[Cluster]:
     with distributed.Client(
         processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as client:
-        yield Cluster(client, "inproc", print)
+        cluster = Cluster(client, "inproc", print)
+        cluster.require_workers()
+        yield cluster
