@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,7 @@ class Cluster:
     def __init__(self, client: Client, address: str, note: Callable[[str], None]) -> None:
         self.client = client
         self.address = address
-        self._note = note
+        self.note = note
         self._threads: dict[str, int] = {}
         self._refused: dict[str, str] = {}
 
@@ -58,7 +59,7 @@ class Cluster:
             if found == identity():
                 continue
             self._refused[address] = found
-            self._note(f"worker {address} is not used: it has {found}, this is {identity()}")
+            self.note(f"worker {address} is not used: it has {found}, this is {identity()}")
         self._threads = {
             address: int(worker["nthreads"])
             for address, worker in there.items()
@@ -76,7 +77,7 @@ class Cluster:
                 "this package is installed"
             ) from error
         if not self.client.scheduler_info(n_workers=-1)["workers"]:
-            self._note(f"waiting for the first worker at {self.address}")
+            self.note(f"waiting for the first worker at {self.address}")
         try:
             self.client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
         except TimeoutError as error:
@@ -154,10 +155,13 @@ def _config(options: ClusterOptions) -> dict[str, Any]:
 def _local_cluster(num_workers: int) -> Any:
     from distributed import LocalCluster
 
+    # A process that is left at once cannot clean up after itself; what does so would say it.
+    sys.warnoptions.append("ignore:resource_tracker")
     return LocalCluster(
         n_workers=num_workers,
         threads_per_worker=1,
         processes=True,
+        preload=["sfm_front.cluster.preload"],
         host="127.0.0.1",
         dashboard_address="127.0.0.1:0",
         silence_logs=logging.CRITICAL,

@@ -96,12 +96,10 @@ class Coordinator:
         return self._photos.num_entered
 
     def run(self, is_stopped: Callable[[], bool]) -> SessionResult:
-        """All of it. Once it is stopped, what has been begun ends, and the photos taken so far are
-        finished with."""
+        """All of it. Once it is stopped, no more photos are begun: those taken so far are finished
+        with."""
         self._photos.run(is_stopped)
-        if is_stopped():
-            self._queue.give_up()
-        self._groups.run(is_stopped)
+        self._groups.run()
         self._queue.close()
         self._session.note_cluster(
             self._figures.outcome(

@@ -39,9 +39,8 @@ class GroupStage:
         self.num_groups = 0
         self.num_done = 0
 
-    def run(self, is_stopped: Callable[[], bool]) -> None:
-        """Until the models of all groups are in the session, or of those that are ready when it is
-        stopped."""
+    def run(self) -> None:
+        """Until the models of all groups are in the session."""
         session, figures = self._session, self._queue.figures
         with figures.serial("cut"):
             groups = cut(
@@ -56,14 +55,13 @@ class GroupStage:
             return
         session.begin_growing()
         left = iter(groups)
-        while not is_stopped():
+        while True:
             while not self._queue.is_full and (group := next(left, None)) is not None:
                 self._grow(group)
             self._on_progress()
             if not self._queue.num_under_way:
                 break
             self._queue.wait()
-        self._queue.give_up()
         session.end_growing()
 
     def _grow(self, group: Sequence[int]) -> None:

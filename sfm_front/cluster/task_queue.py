@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _LARGE = 2**20
 # Seconds after which one looks whether new workers have come.
 _LOOK_S = 5.0
+# How long workers may all be away.
+_PATIENCE_S = 600.0
 
 
 @dataclass(slots=True, eq=False)
@@ -55,6 +57,7 @@ class TaskQueue(Closeable):
         self._under_way: dict[str, Task] = {}
         self._ended: SimpleQueue[Future[Any]] = SimpleQueue()
         self._looked = time.monotonic()
+        self._missed_since: float | None = None
         # Of each kind of which none has succeeded yet.
         self._given_up: Counter[str] = Counter()
 
@@ -110,14 +113,6 @@ class TaskQueue(Closeable):
         self.figures.end()
         self._take(task, future)
 
-    def give_up(self) -> None:
-        """Whatever is under way is no longer wanted."""
-        futures = [task.held[-1] for task in self._under_way.values()]
-        for _ in self._under_way:
-            self.figures.end()
-        self._under_way.clear()
-        self._cluster.client.cancel(futures, force=True)
-
     def close(self) -> None:
         """Forget what is under way."""
         self._under_way.clear()
@@ -129,7 +124,9 @@ class TaskQueue(Closeable):
         self._cluster.look()
         there = self._cluster.workers
         if not there:
+            self._miss_workers()
             return
+        self._missed_since = None
         for task in [task for task in self._under_way.values() if not task.workers & there]:
             # All those that it may run on are gone; others have come.
             del self._under_way[task.key]
@@ -137,6 +134,18 @@ class TaskQueue(Closeable):
             client.cancel([task.held[-1]], force=True)
             task.attempts -= 1
             self.submit(task)
+
+    def _miss_workers(self) -> None:
+        """Tell that none is there; raise InputError once that has lasted."""
+        now = time.monotonic()
+        if self._missed_since is None:
+            self._missed_since = now
+            self._cluster.note(f"no worker of {self._cluster.address} is there: waiting for one")
+        elif now - self._missed_since > _PATIENCE_S:
+            raise InputError(
+                f"{self._cluster.address}: no worker has come back in {_PATIENCE_S / 60:.0f} "
+                "minutes. Start some: the same command goes on from here."
+            )
 
     def _take(self, task: Task, future: Future[Any]) -> None:
         from distributed import CancelledError, KilledWorker
