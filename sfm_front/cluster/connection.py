@@ -117,9 +117,7 @@ def connected(options: ClusterOptions, note: Callable[[str], None]) -> Iterator[
     import dask
     from distributed import Client
 
-    for name in ("distributed", "tornado"):
-        # Each death of a worker would be told with a traceback; ours is a line.
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    _silence()
     with ExitStack() as opened:
         opened.enter_context(dask.config.set(_config(options)))
         target: Any = options.address
@@ -137,6 +135,13 @@ def connected(options: ClusterOptions, note: Callable[[str], None]) -> Iterator[
         cluster = Cluster(client, client.scheduler.address, note)
         cluster.require_workers()
         yield cluster
+
+
+def _silence() -> None:
+    """Each death of a worker would be told with a traceback; ours is a line."""
+    named = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]
+    for name in ("distributed", "tornado", *named):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _config(options: ClusterOptions) -> dict[str, Any]:
