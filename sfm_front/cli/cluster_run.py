@@ -75,9 +75,10 @@ class ClusterRun(Closeable):
 def in_words(now: ClusterProgress) -> str:
     """On one line."""
     if now.num_groups:
+        joined = f", {now.num_joined} of {now.num_joins} joined" if now.num_joins else ""
         what = (
-            f"{now.num_grown} of {counted(now.num_groups, 'group')} grown, {now.num_placed} photos "
-            "placed"
+            f"{now.num_grown} of {counted(now.num_groups, 'group')} grown{joined}, "
+            f"{counted(now.num_placed, 'photo')} placed"
         )
     else:
         what = (

@@ -14,7 +14,7 @@ from sfm_front.cluster.options import ClusterOptions
 from sfm_front.cluster.photo_stage import PhotoStage
 from sfm_front.cluster.storage_probe import all_see_photo, all_see_token
 from sfm_front.cluster.task_queue import TaskQueue
-from sfm_front.cluster.work import DESCRIBE, GROW, MATCH, RunSettings
+from sfm_front.cluster.work import DESCRIBE, GROW, JOIN, MATCH, RunSettings
 from sfm_front.cluster.workbench import extraction_settings
 from sfm_front.cluster.working_folder import WorkingFolder
 from sfm_front.features.extraction import make_extractor
@@ -34,6 +34,8 @@ class ClusterProgress:
     num_matched: int
     num_groups: int
     num_grown: int
+    num_joins: int
+    num_joined: int
     num_placed: int
     num_workers: int
     num_under_way: int
@@ -121,7 +123,9 @@ class Coordinator:
                 num_described=photos.num_described,
                 num_matched=photos.num_entered,
                 num_groups=groups.num_groups,
-                num_grown=groups.num_done,
+                num_grown=groups.num_grown,
+                num_joins=groups.num_joins,
+                num_joined=groups.num_joined,
                 num_placed=self._session.num_placed,
                 num_workers=self._queue.num_threads,
                 num_under_way=self._queue.num_under_way,
@@ -135,7 +139,8 @@ class Coordinator:
         tasks = {
             DESCRIBE: (photos.num_photos - photos.num_described) / self._batch_size,
             MATCH: (photos.num_photos - photos.num_entered) / self._batch_size,
-            GROW: float(groups.num_groups - groups.num_done),
+            GROW: float(groups.num_groups - groups.num_grown),
+            JOIN: float(groups.num_joins - groups.num_joined),
         }
         left = 0.0
         for kind, number in tasks.items():

@@ -23,7 +23,7 @@ from sfm_front.types import (
     Skipped,
 )
 
-DESCRIBE, MATCH, GROW = "describe", "match", "grow"
+DESCRIBE, MATCH, GROW, JOIN = "describe", "match", "grow", "join"
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +120,14 @@ class GrownModel:
     files: Mapping[str, bytes]
     state: ModelState
     num_registered: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JoinWork:
+    """Two groups as one, and the models that were grown of them."""
+
+    group: GroupWork
+    models: tuple[GrownModel, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,12 +8,13 @@ from threading import Lock
 from typing import Any
 
 from sfm_front.cluster.describing import describe
-from sfm_front.cluster.growing import grow
+from sfm_front.cluster.growing import grow, join
 from sfm_front.cluster.identity import worker_name
 from sfm_front.cluster.matching import match
 from sfm_front.cluster.work import (
     DESCRIBE,
     GROW,
+    JOIN,
     MATCH,
     Answer,
     RunSettings,
@@ -27,6 +28,7 @@ _DO: Mapping[str, Callable[[Workbench, Any, Counts], Any]] = {
     DESCRIBE: describe,
     MATCH: match,
     GROW: grow,
+    JOIN: join,
 }
 
 

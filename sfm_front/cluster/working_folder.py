@@ -91,5 +91,10 @@ def key_of(work: GroupWork) -> str:
     return digest.hexdigest()
 
 
+def key_of_join(first: str, second: str) -> str:
+    """Of what is joined of two groups with these keys."""
+    return hashlib.blake2b(f"{first} and {second}".encode(), digest_size=16).hexdigest()
+
+
 def _write(path: Path, content: bytes) -> None:
     write_atomically(path, lambda file: file.write(content))

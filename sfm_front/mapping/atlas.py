@@ -117,8 +117,8 @@ class Atlas:
             )
         self.initializer.go_on_after(max((model.model_id for model in self.models), default=0))
 
-    def take_model(self, reconstruction: pycolmap.Reconstruction, state: ModelState) -> None:
-        """Take in one that was grown elsewhere over the same photos; it gets an id of its own.
+    def take_model(self, reconstruction: pycolmap.Reconstruction, state: ModelState) -> int:
+        """Take in one that was grown elsewhere over the same photos; returns its id here.
 
         It is joined to others when they grow."""
         model = Model.restored(
@@ -131,6 +131,11 @@ class Atlas:
         )
         self.models.append(model)
         self.drop_covered()
+        return model.model_id
+
+    def remove(self, model_ids: Collection[int]) -> None:
+        """Others hold what these models hold."""
+        self.models = [model for model in self.models if model.model_id not in model_ids]
 
     @property
     def registered(self) -> set[int]:

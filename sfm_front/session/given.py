@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import pycolmap
@@ -142,15 +142,23 @@ class GivenSession(Session):
         if not self.has_models:
             self.database.remember(_STAGE, _GROWING)
 
-    def take_models(self, models: Iterable[tuple[pycolmap.Reconstruction, ModelState]]) -> None:
-        """Take in the models of a group."""
+    def take_models(
+        self,
+        models: Iterable[tuple[pycolmap.Reconstruction, ModelState]],
+        *,
+        in_place_of: Collection[int] = (),
+    ) -> list[int]:
+        """Take in the models of a group, or those that were joined of the ones with these ids;
+        returns their ids."""
+        atlas = self._parts.atlas
 
-        def take() -> None:
-            for reconstruction, state in models:
-                self._parts.atlas.take_model(reconstruction, state)
+        def take() -> list[int]:
+            atlas.remove(in_place_of)
+            return [atlas.take_model(reconstruction, state) for reconstruction, state in models]
 
-        self._placing_more(take)
+        taken = self._placing_more(take)
         self._write_snapshot_if_due()
+        return taken
 
     def end_growing(self) -> None:
         """All of them are there, and on the disk when this returns."""

@@ -6,10 +6,11 @@ import json
 import os
 import signal
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from helpers.clustering import run, village
+from helpers.clustering import GROUPS, run, village
 
 from sfm_front.cluster.connection import Cluster
 from sfm_front.cluster.coordinator import ClusterProgress
@@ -78,3 +79,13 @@ def test_features_are_sent_where_no_folder_is_shared(
     photos = sum(photo.path.stat().st_size for photo in village())
     by_kind = {kind.kind: kind for kind in found.tasks}
     assert by_kind["describe"].bytes_in > photos
+
+
+def test_workers_join_groups_two_at_a_time(processes: Cluster, tmp_path: Path) -> None:
+    options = replace(GROUPS, group_size=10)  # the least: five photos each, by four groups
+    result = run(processes, tmp_path / "out", village(), options=options)
+    assert [model.num_registered for model in result.models] == [21]
+    found = result.summary.cluster
+    assert found is not None
+    assert [group.is_join for group in found.groups].count(True) == 2
+    assert {kind.kind: kind.count for kind in found.tasks}["join"] == 2

@@ -11,6 +11,7 @@ _TASKS = {
     "describe": "describing photos",
     "match": "matching photos",
     "grow": "growing models of groups",
+    "join": "joining models of groups",
 }
 
 
@@ -69,7 +70,8 @@ def _in_words(cluster: ClusterOutcome) -> str:
     return (
         f"Scheduler {cluster.scheduler}.{page} Features went {files}. Groups of "
         f"{cluster.group_size} photos. Work was handed out for "
-        f"{cluster.distributed_seconds:.1f} s; {counted(cluster.lost, 'task')} begun again. The coordinator meanwhile: {serial}."
+        f"{cluster.distributed_seconds:.1f} s; {counted(cluster.lost, 'task')} begun again. The "
+        f"coordinator meanwhile: {serial}."
     )
 
 
