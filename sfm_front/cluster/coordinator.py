@@ -64,7 +64,7 @@ class Coordinator:
         reader = PhotoReader(max_image_size=session.options.max_image_size)
         device, _ = usable_device(session.options.device)
         sift = make_extractor(device, session.options.sift)
-        descriptor = session.global_descriptor
+        descriptor, weights = session.global_descriptor, session.options.weights
         with self._figures.serial("probe"):
             token, content = self._folder.write_token()
             self.is_shared = all_see_token(cluster, token, content)
@@ -72,7 +72,12 @@ class Coordinator:
         settings = RunSettings(
             run_id=uuid4().hex,
             # By its parts: auto might find other weights on another machine.
-            options=replace(session.options, global_descriptor=descriptor.name, threads=1),
+            options=replace(
+                session.options,
+                global_descriptor=descriptor.name,
+                weights=None if weights is None else weights.absolute(),
+                threads=1,
+            ),
             descriptor=descriptor.fingerprint,
             cache=self._folder.path if self.is_shared else None,
         )
@@ -111,9 +116,7 @@ class Coordinator:
                 group_size=self._options.group_size,
             )
         )
-        result = self._session.finish()
-        self._folder.remove()
-        return result
+        return self._session.finish()
 
     def _tell(self) -> None:
         photos, groups = self._photos, self._groups

@@ -72,10 +72,6 @@ class WorkingFolder:
             return None
         return models
 
-    def remove(self) -> None:
-        """All is in the output itself."""
-        shutil.rmtree(self.path, ignore_errors=True)
-
 
 def key_of(work: GroupWork) -> str:
     """Equal for groups only if the same photos and matches are in them."""

@@ -107,6 +107,7 @@ class GivenSession(Session):
         if isinstance(view, Skipped):
             self.add_extracted(view)
             return None
+        self._announcer.path_of(photo.name)
         self._announcer.tell(PhotoDescribed(photo.name, len(photo.features), photo.seconds))
         clock = Stopwatch()
         with clock.stage("retrieve"):

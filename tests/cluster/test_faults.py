@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.clustering import run, village
+from helpers.clustering import SMALL, run, village
 
 from sfm_front.cluster import worker
 from sfm_front.cluster.connection import Cluster
 from sfm_front.cluster.coordinator import ClusterProgress
 from sfm_front.cluster.work import DESCRIBE, GROW, MATCH
 from sfm_front.cluster.workbench import Counts, Workbench
+from sfm_front.session.session import Session
 from sfm_front.types import Skipped
 
 pytestmark = pytest.mark.slow
@@ -106,6 +107,24 @@ def test_a_coordinator_that_dies_is_gone_on_with(
         assert set(by_kind) == {GROW}
         assert by_kind[GROW].count == 1
         assert len(found.groups) == 2
+
+
+def test_one_process_goes_on_with_what_a_cluster_left(threads: Cluster, tmp_path: Path) -> None:
+    def die(now: ClusterProgress) -> None:
+        if now.num_matched >= 9:
+            raise _DiedError
+
+    with pytest.raises(_DiedError):
+        run(threads, tmp_path / "out", village(), on_progress=die)
+    with Session(tmp_path / "out", SMALL, resume=True) as session:
+        there = session.num_restored
+        assert there >= 9
+        for photo in village()[there:]:
+            session.add(photo.path)
+        result = session.finish()
+    assert [model.num_registered for model in result.models] == [21]
+    assert result.summary.cluster is None
+    assert not (tmp_path / "out" / "cluster").exists()
 
 
 def test_photos_that_come_later_join_the_models_that_are_there(
