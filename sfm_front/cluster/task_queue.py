@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _LARGE = 2**20
 # Seconds after which one looks whether new workers have come.
 _LOOK_S = 5.0
+# A worker that is never there.
+_NOBODY = "nobody"
 # How long workers may all be away.
 _PATIENCE_S = 600.0
 
@@ -78,24 +80,29 @@ class TaskQueue(Closeable):
 
     def submit(self, task: Task) -> None:
         """Hand it out."""
-        from distributed import CancelledError
-
         task.attempts += 1
-        parcel = pack((self._settings, pack(task.work())))
+        parcel = pack((self._settings, task.work()))
         task.key = f"{task.kind}-{uuid4().hex}"
         client, task.workers = self._cluster.client, self._cluster.workers
-        where: dict[str, Any] = {"workers": list(task.workers)}
-        sent: Any = parcel
-        try:
-            if len(parcel) > _LARGE:
-                sent = client.scatter(parcel, direct=True, hash=False, **where)
-            future = client.submit(run_task, task.kind, sent, key=task.key, pure=False, **where)
-        except (OSError, CancelledError, TimeoutError) as error:
-            raise self._gone() from error
+        # With none it waits: without a name, it would run on any.
+        names = list(task.workers) or [_NOBODY]
+        sent = self._sent(parcel, names) if task.workers and len(parcel) > _LARGE else parcel
+        if client.status != "running":
+            raise self._gone()
+        future = client.submit(run_task, task.kind, sent, key=task.key, pure=False, workers=names)
         task.held = [sent, future]
         self._under_way[task.key] = task
         self.figures.begin()
         future.add_done_callback(self._ended.put)
+
+    def _sent(self, parcel: bytes, names: list[str]) -> Any:
+        """On one of these workers; if that one has just died, it goes through the scheduler."""
+        from distributed import CancelledError
+
+        try:
+            return self._cluster.client.scatter(parcel, workers=names, direct=True, hash=False)
+        except (OSError, CancelledError, TimeoutError, KeyError, ValueError):
+            return parcel
 
     def wait(self, seconds: float = 0.5) -> None:
         """Take the results that have come, or wait so long for one."""

@@ -139,7 +139,6 @@ class Answer:
 
     result: bytes
     worker: str
-    started: float
     seconds: float
     cpu_seconds: float
     items: int

@@ -36,15 +36,14 @@ def run(kind: str, parcel: bytes) -> Answer:
     """On the thread that Dask calls."""
     settings: RunSettings
     settings, work = unpack(parcel)
-    started, began, cpu = time.time(), time.perf_counter(), time.process_time()
+    began, cpu = time.perf_counter(), time.process_time()
     limit_this_thread()
     counts = Counts(bytes_in=len(parcel))
     with single_threaded_calls(opencv=True):
-        result = pack(_DO[kind](_workbench(settings), unpack(work), counts))
+        result = pack(_DO[kind](_workbench(settings), work, counts))
     return Answer(
         result=result,
         worker=worker_name(),
-        started=started,
         seconds=time.perf_counter() - began,
         cpu_seconds=time.process_time() - cpu,
         items=counts.items,
