@@ -10,6 +10,10 @@ compared. A point that a photo happens to miss does not count: nobody in the who
 have seen it. What is counted are missing correspondences as in Zach, Irschara and Bischof, "What
 Can Missing Correspondences Tell Us About 3D Structure and Motion?", CVPR 2008, by area; both parts
 must miss some, for one alone may be out of focus, or behind something.
+
+Nor does a point that a verified match says the other photo sees, about where it should: where two
+ends of a long way round meet, each has points of its own of the same things, as far apart as the
+model has drifted (TUNING: fold-drift).
 """
 
 from __future__ import annotations
@@ -22,7 +26,11 @@ import pycolmap
 from sfm_front.errors import ConfigError
 from sfm_front.geometry.posed_camera import PosedCamera
 from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, halves, parts
-from sfm_front.mapping.photo_grid import cells_of, occupied, widened
+from sfm_front.mapping.photo_grid import CELLS, cells_of, occupied, widened
+from sfm_front.mapping.view_graph import ViewGraph
+from sfm_front.types import Float64Array
+
+_NOWHERE: Float64Array = np.zeros((0, 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,13 +63,15 @@ class FoldOptions:
 
 
 def find_fold(
-    reconstruction: pycolmap.Reconstruction, options: FoldOptions | None = None
+    reconstruction: pycolmap.Reconstruction,
+    view_graph: ViewGraph,
+    options: FoldOptions | None = None,
 ) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
     """Image ids of the two parts of a model that contradict each other most, the larger first.
 
     None if none do so enough to tell.
     """
-    comparison = _Comparison(reconstruction, options or FoldOptions())
+    comparison = _Comparison(reconstruction, view_graph, options or FoldOptions())
     worst, largest = None, 0.0
     for beyond in halves(comparison.num_shared):
         conflict = comparison.conflict(beyond)
@@ -73,7 +83,14 @@ def find_fold(
 class _Comparison:
     """What the photos of a model see of each other's points."""
 
-    def __init__(self, reconstruction: pycolmap.Reconstruction, options: FoldOptions) -> None:
+    def __init__(
+        self,
+        reconstruction: pycolmap.Reconstruction,
+        view_graph: ViewGraph,
+        options: FoldOptions,
+    ) -> None:
+        self._reconstruction = reconstruction
+        self._view_graph = view_graph
         self._options = options
         self.covisibility = Covisibility.of(reconstruction, min_observers=options.min_observers)
         self.num_shared = self.covisibility.num_shared()
@@ -152,18 +169,42 @@ class _Comparison:
         first, second = (self.covisibility.observed[photo] for photo in pair)
         unique = first[~seen_by_others[first]], second[~seen_by_own[second]]
         shared = np.union1d(first[seen_by_others[first]], second[seen_by_own[second]])
-        return self._cells(pair, unique, shared)
+        return self._cells(pair, unique, shared, (self._found(pair), self._found(pair[::-1])))
+
+    def _found(self, pair: tuple[int, int]) -> Float64Array:
+        """(K, 2) pixels of the first photo that matches link to points of the second, and that lie
+        within a cell of these."""
+        first, second = (
+            self._reconstruction.image(int(self.covisibility.image_ids[photo])) for photo in pair
+        )
+        pixels, points = [], []
+        for ours, theirs in self._view_graph.matches(first.image_id, second.image_id).tolist():
+            seen = second.point2D(theirs)
+            if seen.has_point3D():
+                pixels.append(first.point2D(ours).xy)
+                points.append(self._reconstruction.point3D(seen.point3D_id).xyz)
+        found = np.array(pixels, np.float64).reshape(-1, 2)
+        posed = self._posed[pair[0]]
+        off = posed.project(np.array(points, np.float64).reshape(-1, 3)) - found
+        cell = max(posed.camera.width, posed.camera.height) / CELLS
+        # False for nan: points behind the camera.
+        return found[np.abs(off).max(axis=1, initial=0) <= cell]
 
     def _cells(
-        self, pair: tuple[int, int], unique: tuple[IndexArray, IndexArray], shared: IndexArray
+        self,
+        pair: tuple[int, int],
+        unique: tuple[IndexArray, IndexArray],
+        shared: IndexArray,
+        found: tuple[Float64Array, Float64Array] = (_NOWHERE, _NOWHERE),
     ) -> IndexArray:
         """(2, 2) cells in which the first photo and the second miss unique points of the other,
-        with no shared ones near; and cells with shared points."""
+        with no shared ones near; and cells with shared points. ``found``: pixels of either photo
+        that count as shared points too."""
         counts = []
-        for photo, theirs in zip(pair, unique[::-1], strict=True):
+        for photo, theirs, also in zip(pair, unique[::-1], found, strict=True):
             posed = self._posed[photo]
             pixels = posed.project(self.covisibility.points[np.concatenate([theirs, shared])])
-            cells = cells_of(pixels, posed.camera)
+            cells = cells_of(np.concatenate([pixels, also]), posed.camera)
             missing, same = occupied(cells[: len(theirs)]), occupied(cells[len(theirs) :])
             missing &= ~widened(same)
             counts.append((np.count_nonzero(missing), np.count_nonzero(same)))
