@@ -188,7 +188,8 @@ class _Comparison:
         off = posed.project(np.array(points, np.float64).reshape(-1, 3)) - found
         cell = max(posed.camera.width, posed.camera.height) / CELLS
         # False for nan: points behind the camera.
-        return found[np.abs(off).max(axis=1, initial=0) <= cell]
+        near: Float64Array = found[np.abs(off).max(axis=1, initial=0) <= cell]
+        return near
 
     def _cells(
         self,
