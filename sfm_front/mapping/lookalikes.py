@@ -25,7 +25,7 @@ import pycolmap
 
 from sfm_front.errors import ConfigError
 from sfm_front.geometry.posed_camera import PosedCamera
-from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, halves, parts
+from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, parts
 from sfm_front.mapping.photo_grid import CELLS, cells_of, occupied, widened
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import Float64Array
@@ -73,7 +73,7 @@ def find_fold(
     """
     comparison = _Comparison(reconstruction, view_graph, options or FoldOptions())
     worst, largest = None, 0.0
-    for beyond in halves(comparison.num_shared):
+    for beyond in comparison.sharing.halves():
         conflict = comparison.conflict(beyond)
         if conflict > largest:
             worst, largest = beyond, conflict
@@ -93,14 +93,16 @@ class _Comparison:
         self._view_graph = view_graph
         self._options = options
         self.covisibility = Covisibility.of(reconstruction, min_observers=options.min_observers)
-        self.num_shared = self.covisibility.num_shared()
+        self.sharing = self.covisibility.sharing()
+        self._comparable = self.sharing.pairs(options.min_shared)
+        # Of those; nan until it is asked for.
+        self._angles_deg = np.full(len(self._comparable), np.nan)
         images = [reconstruction.image(int(i)) for i in self.covisibility.image_ids]
         self._posed = [
             PosedCamera(reconstruction.camera(image.camera_id), image.cam_from_world())
             for image in images
         ]
         self._centers = np.array([posed.center for posed in self._posed])
-        self._angles_deg: dict[tuple[int, int], float] = {}
         self._bounds: dict[tuple[int, int], IndexArray] = {}
 
     def conflict(self, beyond: BoolArray) -> float:
@@ -124,31 +126,28 @@ class _Comparison:
 
     def _pairs(self, beyond: BoolArray) -> list[tuple[int, int]]:
         """The pairs to compare, the first photo of each ``beyond``."""
-        inside, outside = np.flatnonzero(beyond), np.flatnonzero(~beyond)
-        shared = self.num_shared[np.ix_(inside, outside)]
-        rows, columns = np.nonzero(shared >= self._options.min_shared)
-        order = np.argsort(-shared[rows, columns], kind="stable")
+        first, second = self._comparable.T
+        angles, most = self._angles_deg, self._options.max_angle_deg
+        crossing = np.flatnonzero((beyond[first] != beyond[second]) & ~(angles > most))
         chosen: list[tuple[int, int]] = []
-        for row, column in zip(rows[order], columns[order], strict=True):
-            pair = int(inside[row]), int(outside[column])
-            if self._angle_deg(pair) <= self._options.max_angle_deg:
-                chosen.append(pair)
+        for row in crossing.tolist():
+            one, other = self._comparable[row].tolist()
+            if np.isnan(angles[row]):
+                angles[row] = self._angle_deg((one, other))
+            if angles[row] <= most:
+                chosen.append((one, other) if beyond[one] else (other, one))
                 if len(chosen) == self._options.max_pairs:
                     break
         return chosen
 
     def _angle_deg(self, pair: tuple[int, int]) -> float:
         """Median angle between the directions in which two photos see the points they share."""
-        key = min(pair), max(pair)
-        if key not in self._angles_deg:
-            first, second = (self.covisibility.observed[photo] for photo in key)
-            points = self.covisibility.points[np.intersect1d(first, second, assume_unique=True)]
-            rays1, rays2 = (points - self._centers[photo] for photo in key)
-            cosine = np.einsum("nd,nd->n", rays1, rays2)
-            cosine /= np.linalg.norm(rays1, axis=1) * np.linalg.norm(rays2, axis=1)
-            angle = float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
-            self._angles_deg[key] = angle
-        return self._angles_deg[key]
+        first, second = (self.covisibility.observed[photo] for photo in pair)
+        points = self.covisibility.points[np.intersect1d(first, second, assume_unique=True)]
+        rays1, rays2 = (points - self._centers[photo] for photo in pair)
+        cosine = np.einsum("nd,nd->n", rays1, rays2)
+        cosine /= np.linalg.norm(rays1, axis=1) * np.linalg.norm(rays2, axis=1)
+        return float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
 
     def _bound(self, pair: tuple[int, int]) -> IndexArray:
         """At least as many cells in which things are missing, and no more that are the same, than
