@@ -88,17 +88,24 @@ def halves(num_shared: IndexArray) -> Iterator[BoolArray]:
     own = num_shared.diagonal()
     if len(own) == 0:
         return
-    overlap = num_shared / np.maximum(own[:, None] + own[None, :] - num_shared, 1)
+
+    def overlap(photo: int) -> Float64Array:
+        """(N,) with each photo; of all at once it would take gigabytes in a long flight."""
+        shared = num_shared[photo]
+        share: Float64Array = shared / np.maximum(own[photo] + own - shared, 1)
+        return share
+
     num_photos = len(own)
-    nearest, closest = np.zeros(num_photos, np.int64), overlap[0].copy()
+    nearest, closest = np.zeros(num_photos, np.int64), overlap(0)
     closest[0] = -1
     order = []
     for _ in range(num_photos - 1):
         photo = int(np.argmax(closest))
         order.append(photo)
         closest[photo] = -1
-        closer = (overlap[photo] > closest) & (closest >= 0)
-        nearest[closer], closest[closer] = photo, overlap[photo, closer]
+        with_photo = overlap(photo)
+        closer = (with_photo > closest) & (closest >= 0)
+        nearest[closer], closest[closer] = photo, with_photo[closer]
     beyond = np.eye(num_photos, dtype=np.bool_)
     for photo in reversed(order):
         beyond[nearest[photo]] |= beyond[photo]

@@ -238,6 +238,7 @@ class Session(Closeable):
             self._placing_more(self._parts.second_look.at_end)
             self._write_snapshot_if_due()  # It may have placed many, and adjusting takes long.
         with clock.stage("finish"):
+            self._parts.catalog.forget_features()
             self._placing_more(
                 lambda: finish(
                     self._parts.atlas,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from helpers.model_building import model_of
@@ -42,3 +44,16 @@ def test_a_chain_is_parted_at_each_of_its_links():
 @pytest.mark.parametrize("num_photos", [0, 1])
 def test_less_than_two_photos_have_no_parts(num_photos):
     assert list(halves(np.ones((num_photos, num_photos), np.int64))) == []
+
+
+def test_the_tree_takes_less_memory_than_what_it_is_made_of():
+    number = np.arange(1500)
+    num_shared = np.maximum(0, 20 - np.abs(number[:, None] - number))
+    tracemalloc.start()
+    try:
+        *_, last = halves(num_shared)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert np.count_nonzero(last) in (1, len(number) - 1)
+    assert peak < num_shared.nbytes / 2
