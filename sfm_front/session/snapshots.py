@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,9 @@ from sfm_front.storage.watched_mark import is_watched
 from sfm_front.types import ModelSummary, Uint8Array
 
 logger = logging.getLogger(__name__)
+
+MakeSidecar = Callable[[], "Sidecar | None"]
+"""Makes what stands in ``georeference.json``."""
 
 _VERSION = 1
 # A snapshot of a large model takes long: at most this share of the time goes into them.
@@ -80,14 +83,15 @@ class Snapshots:
         num_photos: int,
         colors: Mapping[int, Uint8Array],
         georeferencing: Mapping[str, Any],
-        sidecar: Sidecar | None,
+        sidecar: MakeSidecar,
         *,
         final: bool = False,
         text: bool = False,
     ) -> list[ModelSummary]:
         """Write all models, whole or not at all; ``final`` ones with their point clouds.
 
-        ``georeferencing``: as ``Georeferencing.as_json`` gives it.
+        ``georeferencing``: as ``Georeferencing.as_json`` gives it. ``sidecar`` makes what stands in
+        ``georeference.json``: of many photos this takes its time, too.
 
         Raises StorageError if the disk is full, or the output was removed.
         """
@@ -113,7 +117,7 @@ class Snapshots:
                 "models": [asdict(model.state) for model in models],
                 "georeferencing": georeferencing,
             },
-            sidecar=sidecar,
+            sidecar=sidecar(),
         )
         self._last = time.monotonic()
         self._spent = self._last - started
