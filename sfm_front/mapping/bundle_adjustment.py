@@ -24,9 +24,9 @@ class RobustAdjustmentOptions:
     # Reprojection error from which the Cauchy loss gives way (TUNING: robust-loss).
     loss_scale_px: float = 1.0
     # Relative change of the cost at which it stops, and that for large models: long flights stay
-    # bent with the looser one (TUNING: robust-tolerance).
+    # bent with looser ones (TUNING: robust-tolerance, large-tolerances).
     tolerance: float = 1e-4
-    large_tolerance: float = 1e-7
+    large_tolerance: float = 1e-8
     # Whether focal length and distortion may move, and the principal point of an unknown camera.
     refine_intrinsics: bool = True
     num_threads: int = 2

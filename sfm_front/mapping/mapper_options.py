@@ -64,10 +64,11 @@ class ConvergenceOptions:
     global_tolerance: float = 1e-4
     global_iterations: int = 15
     global_refinements: int = 2
-    # Global ones of a complete model, and of a large one. COLMAP's own tolerance is 0. 1e-6 gives
-    # the same model; with 1e-5 a long flight stays bent (TUNING: final-tolerance).
+    # Global ones of a complete model, and of a large one. COLMAP's own tolerance is 0. With 1e-5 a
+    # long flight stays bent (TUNING: final-tolerance), with 1e-6 more or less so, by the order of
+    # its photos (TUNING: large-tolerances).
     final_tolerance: float = 1e-5
-    large_final_tolerance: float = 1e-6
+    large_final_tolerance: float = 1e-7
     # That from which the robust adjustment of a model that is not large goes on, at the end.
     last_tolerance: float = 3e-5
     # Share of the observations from which that refinement goes on to another round.
