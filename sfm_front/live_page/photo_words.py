@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from sfm_front.live_page import palette
 from sfm_front.live_page.follower import Outcome, Seen
 from sfm_front.live_page.markup_parts import NAME, PADDED, ROW, SCROLL, dot, what_became
-from sfm_front.live_page.story import PhotoState
 from sfm_front.reports.html.markup import Html, tag
+from sfm_front.reports.story import PhotoState
 from sfm_front.reports.words import counted
 
 # Rows of a list; more would take a browser longer than a second to lay out.

@@ -10,8 +10,8 @@ import time
 from sfm_front.live_page import palette
 from sfm_front.live_page.follower import Seen
 from sfm_front.live_page.markup_parts import PADDED, ROW, SCROLL, dot, what_became
-from sfm_front.live_page.story import PhotoState
 from sfm_front.reports.html.markup import Html, joined, tag
+from sfm_front.reports.story import PhotoState
 from sfm_front.reports.verdict import Verdict
 from sfm_front.reports.words import clock, counted
 

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sfm_front.errors import InputError
-from sfm_front.exporters.colmap import STATE
 from sfm_front.georeference.sidecar import FILE_NAME as SIDECAR
 from sfm_front.reports import event_log, html, report_json, retrieval_log
 from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.database import DATABASE
 from sfm_front.storage.session_lock import SessionLock
+from sfm_front.storage.written_models import STATE
 
 _MARKER = retrieval_log.FILE
 _FILES = (

@@ -9,10 +9,10 @@ import pytest
 from helpers.live_session import HOSTILE
 
 from sfm_front.live_page import photo_words, words
-from sfm_front.live_page.event_words import in_words
 from sfm_front.live_page.follower import Outcome, Seen
-from sfm_front.live_page.story import PhotoState, PhotoStory, Story
+from sfm_front.reports.event_words import in_words
 from sfm_front.reports.lights import Level
+from sfm_front.reports.story import PhotoState, PhotoStory, Story
 from sfm_front.reports.verdict import Verdict
 
 

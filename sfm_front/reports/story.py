@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 import pycolmap
 
-from sfm_front.live_page.event_words import in_words
+from sfm_front.reports.event_words import in_words
 from sfm_front.types import Float64Array
 
 # Lines of what became of models, for reading.
 _MOST_LINES = 200
+GIVEN_UP = "its model was given up"
+"""Why a photo that was placed is in no model any more."""
+
 # Verified pairs below which a photo counts as poorly connected, unless the session says otherwise.
 _FEW_PAIRS = 3
 
@@ -70,6 +73,8 @@ class Story:
         self.began: float | None = None
         self.last: float | None = None
         self.ended: bool | None = None
+        # Of its end, once that has begun.
+        self.step = ""
         self.num_points = 0
         self.few_pairs = _FEW_PAIRS
         # Model id → when its frame changed last, so that poses of before are elsewhere now.
@@ -102,8 +107,11 @@ class Story:
         return photo
 
     def _on_session_started(self, event: Mapping[str, Any]) -> None:
-        self.began, self.ended = self.last, None
+        self.began, self.ended, self.step = self.last, None, ""
         self.few_pairs = int(event["options"]["second_look"]["min_pairs"])
+
+    def _on_finishing_began(self, event: Mapping[str, Any]) -> None:
+        self.step = str(event["step"])
 
     def _on_session_ended(self, event: Mapping[str, Any]) -> None:
         self.ended = bool(event["finished"])
