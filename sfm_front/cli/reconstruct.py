@@ -61,6 +61,7 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
     with leaving_at_signal(1):
         from sfm_front.live_page.extra import scene_if_possible
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
+        from sfm_front.reports.html.beside_session import ReportBesideSession
         from sfm_front.reports.html.page import write_page
         from sfm_front.session.output_folder import holds_session
         from sfm_front.session.resume import Newcomers, nothing_to_do
@@ -111,11 +112,12 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             progress.expect(len(new))
             arriving = new
         taken = 0
-        for _ in session.add_all(arriving):
-            taken += 1
-            if interrupted():
-                break
-        result = session.finish()
+        with ReportBesideSession(output):
+            for _ in session.add_all(arriving):
+                taken += 1
+                if interrupted():
+                    break
+            result = session.finish()
         progress.step("drawing the page")
         scene_if_possible(output)
         write_page(output)
