@@ -77,6 +77,9 @@ def _status(seen: Seen, now: float) -> Html:
     if story.ended is False:
         return joined([dot(palette.WAITING, tag("b", "stopped")), f" after {lasted}"])
     silent_s = now - story.last
+    if story.step:
+        # In one step there may be nothing to tell for minutes.
+        return dot(palette.NEWEST, joined([tag("b", story.step), f" for {clock(silent_s)}"]))
     if silent_s > _SILENT_S:
         return joined(
             [dot(palette.WEAK, tag("b", "running")), f", nothing new for {clock(silent_s)}"]

@@ -73,7 +73,7 @@ class Story:
         self.began: float | None = None
         self.last: float | None = None
         self.ended: bool | None = None
-        # Of its end, once that has begun.
+        # Of its end, in words, once that has begun.
         self.step = ""
         self.num_points = 0
         self.few_pairs = _FEW_PAIRS
@@ -111,7 +111,7 @@ class Story:
         self.few_pairs = int(event["options"]["second_look"]["min_pairs"])
 
     def _on_finishing_began(self, event: Mapping[str, Any]) -> None:
-        self.step = str(event["step"])
+        self.step = in_words(event)
 
     def _on_session_ended(self, event: Mapping[str, Any]) -> None:
         self.ended = bool(event["finished"])

@@ -104,7 +104,7 @@ def words_so_far(story: Story, moment: Moment) -> str:
     if story.ended is False:
         words = f"Stopped at {at} before its end: the same command goes on."
     elif story.step:
-        words = f"Not finished yet. No more photos come; at {at} began: {story.step}."
+        words = f"Not finished yet, but no more photos come. At {at}: {story.step}."
     else:
         words = f"Not finished yet: this is how far it was at {at}."
     states = Counter(photo.state for photo in story.photos.values())

@@ -157,10 +157,12 @@ def test_the_summary_closes_the_output(run):
 
 
 def test_the_steps_of_the_end_are_told_as_they_begin(run):
-    steps = re.findall(r"^finishing: (.*)$", run.stdout, re.M)
-    assert steps == [
-        *(step.value for step in FinishingStep if step is not FinishingStep.CONTROL_POINTS),
-        "drawing the page",
+    steps = [step.value for step in FinishingStep if step is not FinishingStep.CONTROL_POINTS]
+    steps[3] += f" ({run.report['models'][0]['registered']} photos)"
+    told = re.findall(r"^finishing.*$", run.stdout, re.M)
+    assert told == [
+        *(f"finishing {number} of 6: {step}" for number, step in enumerate(steps, start=1)),
+        "finishing: drawing the page",
     ]
 
 

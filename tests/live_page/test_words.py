@@ -85,6 +85,13 @@ def test_the_headline_says_how_it_stands(ended, now, expected):
     assert expected in " ".join(text_of(words.headline(seen(ended=ended), now)).split())
 
 
+def test_the_headline_names_the_step_of_the_end():
+    what = seen()
+    what.story.step = "finishing 4 of 6: last adjustment"
+    text = " ".join(text_of(words.headline(what, 1400.0)).split())
+    assert "finishing 4 of 6: last adjustment for 5:10" in text
+
+
 @pytest.mark.parametrize("level", [Level.GOOD, Level.FAIR, Level.BAD])
 def test_the_verdict_is_text(level):
     judged = replace(seen(ended=True), verdict=Verdict(level, f"All are in. {HOSTILE}"))

@@ -99,7 +99,7 @@ def test_the_step_of_its_end_is_told(tmp_path, photos):
             session.add_extracted(photo)
         session._write_snapshot()
         session.finish()
-    assert any("began: refining the models" in page for page in pages)
+    assert any("finishing 2 of 6: refining the models" in page for page in pages)
 
 
 def test_models_that_are_replaced_meanwhile_are_read_whole(tmp_path, photos):
