@@ -15,8 +15,8 @@ from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.written_models import STATE
 
 _EVERY_S = 30.0
-# Of a large session the page takes long: it is under way for at most this share of the time.
-_MAX_SHARE = 0.05
+# Of a large session the page takes long: it gets at most this share of a processor's time.
+_MAX_SHARE = 0.02
 _TICK_S = 0.5
 
 
@@ -45,11 +45,12 @@ class ReportBesideSession(Closeable):
             if written == self._shown:
                 continue
             self._shown, began_s = written, time.monotonic()
+            spent_s = 0.0
             # Without processes to be had, the page comes at the end.
             with suppress(OSError):
-                self._write()
-            lasted_s = time.monotonic() - began_s
-            pause_s = max(self._every_s, lasted_s / _MAX_SHARE) - lasted_s
+                spent_s = self._write()
+            wanted_s = max(self._every_s, spent_s / _MAX_SHARE)
+            pause_s = max(_TICK_S, wanted_s - (time.monotonic() - began_s))
 
     def _models_written(self) -> int | None:
         """When; None before the first time."""
@@ -58,12 +59,12 @@ class ReportBesideSession(Closeable):
         except OSError:
             return None
 
-    def _write(self) -> None:
-        """Or leave it, where there is no time left."""
+    def _write(self) -> float:
+        """Or leave it, where there is no time left; the seconds of a processor that it took."""
         process = subprocess.Popen(
             module_command("sfm_front.reports.html.page_process", str(self._output)),
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env=module_environment(),
             # Ctrl-C is for the session.
@@ -74,6 +75,10 @@ class ReportBesideSession(Closeable):
                 process.kill()
                 process.wait()
                 self._remove_partial()
+        said, _ = process.communicate()
+        with suppress(ValueError):
+            return float(said)
+        return 0.0  # It failed: where the output is gone, say.
 
     def _remove_partial(self) -> None:
         with suppress(OSError):

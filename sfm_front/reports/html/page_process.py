@@ -1,8 +1,12 @@
-"""Writes ``report.html`` beside a session that goes on: OUTPUT; ``beside_session`` runs it."""
+"""Writes ``report.html`` beside a session that goes on: OUTPUT; ``beside_session`` runs it.
+
+It prints the seconds of processor time that this took.
+"""
 
 from __future__ import annotations
 
 import sys
+import time
 import zlib  # noqa: F401  (before pycolmap)
 from pathlib import Path
 
@@ -17,6 +21,7 @@ def main(output: Path) -> None:
     """Write the page once."""
     let_others_first(_NICE)
     write_page(output)
+    print(time.process_time())
 
 
 if __name__ == "__main__":

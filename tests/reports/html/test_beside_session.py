@@ -42,9 +42,9 @@ def test_the_page_follows_the_models(tmp_path, monkeypatch):
 
 
 class Processes:
-    """Stand-ins that take ``lasting_s``, and when they began."""
+    """Stand-ins that last ``lasting_s`` and say to have worked ``spent_s``; when they began."""
 
-    def __init__(self, monkeypatch, lasting_s: float) -> None:
+    def __init__(self, monkeypatch, lasting_s: float = 0.0, spent_s: float = 0.0) -> None:
         self.began: list[float] = []
         self.killed = 0
         processes = self
@@ -63,6 +63,9 @@ class Processes:
 
             def wait(self) -> None: ...
 
+            def communicate(self) -> tuple[bytes, None]:
+                return b"%.3f\n" % spent_s, None
+
         monkeypatch.setattr(beside_session.subprocess, "Popen", Process)
         monkeypatch.setattr(beside_session, "_TICK_S", 0.01)
 
@@ -78,7 +81,7 @@ def write_models(output, number: int) -> None:
 
 
 def test_without_new_models_nothing_is_written(output, monkeypatch):
-    processes = Processes(monkeypatch, 0.0)
+    processes = Processes(monkeypatch)
     write_models(output, 1)
     with closing(ReportBesideSession(output, every_s=0.02)):
         time.sleep(0.2)
@@ -90,7 +93,7 @@ def test_without_new_models_nothing_is_written(output, monkeypatch):
 
 
 def test_a_page_that_takes_long_comes_seldom(output, monkeypatch):
-    processes = Processes(monkeypatch, 0.1)
+    processes = Processes(monkeypatch, spent_s=0.1)
     monkeypatch.setattr(beside_session, "_MAX_SHARE", 0.2)
     with closing(ReportBesideSession(output, every_s=0.02)):
         number = 0
