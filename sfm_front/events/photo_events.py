@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from sfm_front.events.model_events import ModelEvent
-from sfm_front.types import CandidateOutcome, Skipped
+from sfm_front.types import CandidateOutcome, Skipped, WaitingReason
 
 # Stages of ``PhotoAdded.seconds`` that run ahead of a photo's turn, beside the mapping of others.
 PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})
@@ -83,11 +83,12 @@ class PhotoPlaced:
 
 @dataclass(frozen=True, slots=True)
 class PhotoWaiting:
-    """A photo was stored and fits no model yet, and why."""
+    """A photo was stored and fits no model yet, and why: ``reason`` in words, and its ``kind``."""
 
     name: str
     image_id: int
     reason: str
+    kind: WaitingReason
 
 
 PhotoEvent: TypeAlias = (

@@ -12,7 +12,7 @@ import numpy as np
 import pycolmap
 
 from sfm_front.reports.event_words import in_words
-from sfm_front.types import Float64Array
+from sfm_front.types import Float64Array, WaitingReason
 
 # Lines of what became of models, for reading.
 _MOST_LINES = 200
@@ -46,12 +46,14 @@ class PlacedPose:
 @dataclass(slots=True, eq=False)
 class PhotoStory:
     """One photo. ``links``: verified pairs, name → inliers; ``similar``: what retrieval proposed,
-    best first. ``time``: seconds since 1970 of the last event of its pose."""
+    best first. ``waiting``: of what kind the ``reason`` is, where that is known. ``time``: seconds
+    since 1970 of the last event of its pose."""
 
     name: str
     state: PhotoState = PhotoState.ARRIVED
     image_id: int | None = None
     reason: str = ""
+    waiting: WaitingReason | None = None
     num_keypoints: int = 0
     num_inliers: int = 0
     similar: tuple[str, ...] = ()
@@ -156,6 +158,7 @@ class Story:
     def _on_photo_waiting(self, event: Mapping[str, Any]) -> None:
         photo = self._photo(event)
         photo.state, photo.reason = PhotoState.WAITING, str(event["reason"])
+        photo.waiting = WaitingReason(event["kind"]) if "kind" in event else None
 
     def _on_looked_again(self, event: Mapping[str, Any]) -> None:
         photo = self.by_id[int(event["image_id"])]

@@ -163,6 +163,7 @@ def _outcome(
         image_id=photo.image_id,
         model=model,
         why_not=None if model is not None else _why_not(told, moment),
+        waiting=told.waiting if told and told.state is PhotoState.WAITING else None,
         num_keypoints=photo.num_keypoints,
         most_relevant=photo.candidates[0].name if photo.candidates else None,
         num_verified=sum(candidate.verified for candidate in photo.candidates),

@@ -75,7 +75,7 @@ class Announcer:
             self.tell_placed(atlas, placed_id)
         if image_id not in placed:
             name, why = atlas.view_graph.name(image_id), atlas.why_not_registered(image_id)
-            self.tell(PhotoWaiting(name, image_id, why))
+            self.tell(PhotoWaiting(name, image_id, str(why), why.reason))
 
     def tell_placed(self, atlas: Atlas, image_id: int) -> None:
         """A photo that is registered now and was not before."""
