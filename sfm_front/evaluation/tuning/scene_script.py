@@ -1,4 +1,4 @@
-"""What scripts share that try sessions on scenes: quiet libraries, errors in a line, figures."""
+"""What scripts share that try sessions: quiet libraries, errors in a line, figures."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
+from sfm_front.cli.streams import unfailing_streams
 from sfm_front.errors import SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.tuning.scene_arguments import chosen_settings
@@ -17,17 +18,22 @@ def exit_status(
     parse: Callable[[], argparse.Namespace],
     run: Callable[[argparse.Namespace], None],
 ) -> int:
-    """Run a script called ``name``: 0, or 2 after a line for a mistake in what was given."""
+    """Run a script called ``name``: 0, 2 after a line for a mistake in what was given, 130 after
+    one for Ctrl-C."""
     args = parse()
 
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     try:
-        run(args)
+        with unfailing_streams():
+            run(args)
     except SfmFrontError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted before it was done", file=sys.stderr)
+        return 130
     return 0
 
 
