@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import zlib  # noqa: F401  (before pycolmap)
 
 from sfm_front.cli.progress import CountLine
+from sfm_front.cli.streams import unfailing_streams
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
 from sfm_front.evaluation.robustness.long_ways import Flown, round_trip, two_flights
@@ -89,7 +90,8 @@ def run(args: argparse.Namespace) -> None:
 
 
 def main() -> int:
-    return exit_status("benchmark_joins", parse, run)
+    with unfailing_streams():
+        return exit_status("benchmark_joins", parse, run)
 
 
 if __name__ == "__main__":

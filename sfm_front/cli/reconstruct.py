@@ -63,7 +63,7 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
         from sfm_front.reports.html.beside_session import ReportBesideSession
         from sfm_front.reports.html.page import write_page
-        from sfm_front.session.output_folder import holds_session
+        from sfm_front.session.output_folder import holds_session, told_of_others
         from sfm_front.session.resume import Newcomers, nothing_to_do
         from sfm_front.session.session import Session
 
@@ -83,6 +83,8 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             _check_control_points(options, photos)
         spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
         progress = ProgressLine(spoken, quiet=arguments.quiet)
+        if others := told_of_others(output):
+            progress.note(others)
         on_event = _event_printer() if arguments.events else progress.show
         # Also with --quiet: nobody finds the page without its address.
         page = _page(output, progress.keep, opened) if arguments.viewer else None

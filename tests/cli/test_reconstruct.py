@@ -226,6 +226,15 @@ def test_overwrite_replaces_what_a_session_wrote_and_nothing_else(five, tmp_path
         assert database.num_images() == 2
 
 
+def test_a_folder_with_other_files_is_told_of_before_it_is_written_to(five, tmp_path, capsys):
+    output = tmp_path / "project"
+    (output / "notes").mkdir(parents=True)
+    for _ in range(2):
+        reconstruct(five, output, "--max-features", "50")
+    told = capsys.readouterr().out
+    assert told.count("project: is not empty; notes will stay as they are") == 1
+
+
 def test_random_order_is_the_seeds(five, tmp_path):
     output = tmp_path / "out"
     reconstruct(five, output, "--order", "random", "--seed", "2", "--max-features", "50")

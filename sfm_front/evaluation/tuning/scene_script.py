@@ -6,7 +6,6 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from sfm_front.cli.streams import unfailing_streams
 from sfm_front.errors import SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.tuning.scene_arguments import chosen_settings
@@ -26,8 +25,7 @@ def exit_status(
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     try:
-        with unfailing_streams():
-            run(args)
+        run(args)
     except SfmFrontError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 2
