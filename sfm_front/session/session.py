@@ -106,7 +106,7 @@ class Session(Closeable):
             device=device,
         )
         positions = PhotoPositions(self.options.positions)
-        self._announcer = Announcer([] if on_event is None else [on_event])
+        self._announcer = Announcer([] if on_event is None else [on_event], self.options)
         control_points = ControlPoints(self.options.control_points, self._announcer.tell_of_model)
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         self._finished = False

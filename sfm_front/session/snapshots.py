@@ -14,9 +14,7 @@ import pycolmap
 
 from sfm_front.errors import InputError, StorageError
 from sfm_front.exporters.colmap import (
-    STATE,
     color_points,
-    damaged_file,
     export_models,
     recover_models,
 )
@@ -25,6 +23,7 @@ from sfm_front.mapping.model import Model
 from sfm_front.mapping.model_state import ModelState
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.storage.watched_mark import is_watched
+from sfm_front.storage.written_models import STATE, damaged_file
 from sfm_front.types import ModelSummary, Uint8Array
 
 logger = logging.getLogger(__name__)
