@@ -382,6 +382,8 @@ class Model:
         self._beside.leave()
         started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         self._begin_anew()
+        gain = self._options.coverage_gain(self.num_registered)
+        self._mapping.ba_global_prune_points_min_coverage_gain = gain
         self._mapper.iterative_global_refinement(
             pipeline.ba_global_max_refinements,
             pipeline.ba_global_max_refinement_change,
