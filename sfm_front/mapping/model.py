@@ -61,7 +61,7 @@ class Model:
         self._streaming = options.streaming()
         self._mapping = self._streaming.get_mapper()
         self._triangulation = self._streaming.get_triangulation()
-        self._local = LocalRefinement(self._streaming, options.local_refinement)
+        self._local = LocalRefinement(self._streaming, options.local_refinement, view_graph.part)
         self._schedule = RefinementSchedule(options.schedule)
         self._seen_at_failure: dict[int, int] = {}
         self._mapper, self.reconstruction = view_graph.new_mapper(reconstruction)
