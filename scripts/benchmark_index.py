@@ -39,7 +39,7 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def run(args: argparse.Namespace) -> None:
-    print("photos  median ms  worst ms  recall  memory MiB", flush=True)
+    print("photos  median ms  worst ms  CPU ms  recall  memory MiB", flush=True)
     # Matrix products run on one thread, as they do in a session.
     with single_threaded_calls(opencv=False):
         measure_index(
@@ -56,7 +56,7 @@ def _line(cost: IndexCost) -> str:
     memory = "-" if cost.memory_bytes is None else f"{cost.memory_bytes / 2**20:.0f}"
     return (
         f"{cost.num_photos:<8}{1e3 * cost.median_seconds:>9.1f}{1e3 * cost.worst_seconds:>10.1f}"
-        f"{cost.recall:>8.3f}{memory:>12}"
+        f"{1e3 * cost.processor_seconds:>8.1f}{cost.recall:>8.3f}{memory:>12}"
     )
 
 

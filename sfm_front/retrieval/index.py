@@ -36,7 +36,7 @@ class IndexOptions:
     shortlist: int = 192
     # So many times the square root of the photos, if that is more still: among more photos, more
     # have codes as near as those of the nearest (TUNING: shortlist-growth).
-    shortlist_growth: float = 11.0
+    shortlist_growth: float = 14.0
     # Photos that an expanded query re-orders; twice those requested if that is more. The whole
     # shortlist takes longer and gives the same (TUNING: expansion-depth).
     expansion_depth: int = 100

@@ -34,6 +34,8 @@ MakeSidecar = Callable[[], "Sidecar | None"]
 _VERSION = 1
 # A snapshot of a large model takes long: at most this share of the time goes into them.
 _MAX_SHARE = 0.05
+# But none waits longer for the one before: that may have taken so long because the machine slept.
+_MAX_WAIT_S = 600.0
 # The first one comes after so many seconds, the next ones after this share of the session's age: of
 # what was mapped when a young session is killed, at most a quarter is mapped again.
 _FIRST_S = 1.0
@@ -74,7 +76,8 @@ class Snapshots:
         watched_s = max(_WATCHED_S, self._spent / _WATCHED_SHARE)
         if watched_s < wanted_s and is_watched(self._folder.parent):
             wanted_s = watched_s
-        return now - self._last >= max(min(self._interval_s, wanted_s), self._spent / _MAX_SHARE)
+        rest_s = min(self._spent / _MAX_SHARE, _MAX_WAIT_S)
+        return now - self._last >= max(min(self._interval_s, wanted_s), rest_s)
 
     def write(
         self,

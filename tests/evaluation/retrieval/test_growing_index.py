@@ -53,7 +53,7 @@ def test_the_script_has_a_line_for_each_size():
     )
     lines = done.stdout.splitlines()
     assert [line.split()[0] for line in lines] == ["photos", "20", "40"]
-    assert float(lines[2].split()[3]) > 0.9
+    assert float(lines[2].split()[4]) > 0.9
 
 
 def test_the_script_refuses_what_it_cannot_measure():
