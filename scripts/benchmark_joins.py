@@ -19,10 +19,10 @@ import zlib  # noqa: F401  (before pycolmap)
 
 from sfm_front.cli.progress import CountLine
 from sfm_front.cli.streams import unfailing_streams
-from sfm_front.errors import SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
 from sfm_front.evaluation.robustness.long_ways import Flown, round_trip, two_flights
+from sfm_front.evaluation.tuning.scene_script import exit_status
 from sfm_front.session.options import SessionOptions, available_cores
 from sfm_front.storage.json_files import write_json
 
@@ -90,13 +90,8 @@ def run(args: argparse.Namespace) -> None:
 
 
 def main() -> int:
-    try:
-        with unfailing_streams():
-            run(parse())
-    except SfmFrontError as error:
-        print(f"benchmark_joins: {error}", file=sys.stderr)
-        return 2
-    return 0
+    with unfailing_streams():
+        return exit_status("benchmark_joins", parse, run)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,16 @@
 """Measure the cost of a photo by its place in a long stream, on a synthetic flight.
 
 Features and ground truth are given; nothing is read or detected: a photo is timed from retrieval
-to mapping.
+to mapping. Of several lengths each is flown in a process of its own, and a fit to them says what
+10 000 photos would take.
 """
 
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
+import zlib  # noqa: F401  (before pycolmap)
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
@@ -22,6 +25,7 @@ from sfm_front.cli.streams import unfailing_streams
 from sfm_front.errors import ConfigError, SfmFrontError
 from sfm_front.evaluation.machine import machine
 from sfm_front.evaluation.poses import AUC_THRESHOLDS_DEG
+from sfm_front.evaluation.reconstruction.scale import format_scale, read_result
 from sfm_front.evaluation.reconstruction.stream import PhotoCost, StreamResult, run_stream
 from sfm_front.events import PhotoAdded
 from sfm_front.mapping.atlas import AtlasOptions
@@ -30,11 +34,15 @@ from sfm_front.session.options import SessionOptions, available_cores
 from sfm_front.storage.json_files import write_json
 
 _MIN_PHOTOS = 200
+# What the fit to several lengths is asked for.
+_FIT_TO = 10_000
 
 
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--photos", type=int, default=1000, metavar="N", help="(default: 1000)")
+    parser.add_argument(
+        "--photos", type=int, nargs="+", default=[1000], metavar="N", help="(default: 1000)"
+    )
     parser.add_argument("--points", type=int, default=1000, metavar="N", help="points per photo")
     parser.add_argument("--threads", type=int, metavar="N", help="(default: all cores)")
     parser.add_argument("--seed", type=int, default=0)
@@ -54,13 +62,44 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         metavar=("K1", "P1", "P2"),
         help="distortion of the camera, instead of a radial one of -0.03",
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write every photo's figures")
+    parser.add_argument(
+        "--json",
+        type=Path,
+        metavar="FILE",
+        help="write every photo's figures; of several lengths, one file each, FILE.N.json",
+    )
+    parser.add_argument(
+        "--compare",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="fly nothing: the table of what --json has written",
+    )
     return parser.parse_args(argv)
 
 
-def run(args: argparse.Namespace) -> None:
-    if args.photos < _MIN_PHOTOS:
-        raise ConfigError(f"--photos must be at least {_MIN_PHOTOS}, got {args.photos}")
+def run(args: argparse.Namespace, given: Sequence[str]) -> None:
+    if args.compare:
+        print(format_scale([read_result(file) for file in args.compare], _FIT_TO))
+        return
+    for number in args.photos:
+        if number < _MIN_PHOTOS:
+            raise ConfigError(f"--photos must be at least {_MIN_PHOTOS}, got {number}")
+    if len(args.photos) == 1:
+        run_one(args, args.photos[0])
+        return
+    with TemporaryDirectory(prefix="sfm_front_scale_") as folder:
+        base = args.json or Path(folder) / "stream"
+        files = {number: base.with_name(f"{base.name}.{number}.json") for number in args.photos}
+        for number, file in files.items():
+            # The peak of memory is that of a process. Of an option, the last value counts.
+            again = [sys.executable, __file__, *given, "--photos", str(number), "--json", str(file)]
+            if subprocess.run(again, check=False).returncode:
+                raise ConfigError(f"the flight of {number} photos has failed")
+        print(format_scale([read_result(file) for file in files.values()], _FIT_TO))
+
+
+def run_one(args: argparse.Namespace, num_photos: int) -> None:
     threads = available_cores() if args.threads is None else args.threads
     options = SessionOptions(
         global_descriptor="vlad",
@@ -70,7 +109,7 @@ def run(args: argparse.Namespace) -> None:
     )
     with TemporaryDirectory(prefix="sfm_front_stream_") as output:
         result = run_stream(
-            args.photos,
+            num_photos,
             args.points,
             Path(output),
             options,
@@ -120,7 +159,9 @@ def format_result(result: StreamResult) -> str:
         f"memory in MiB: {_mib(result.memory.at_start)} before the first photo, at most "
         f"{_mib(result.peak_in_stream)} while they came, {_mib(result.memory.peak)} at all; "
         f"of that pycolmap's graph and models {_mib(result.memory.colmap)}",
-        f"end of the session: {result.finish_seconds:.1f} s",
+        f"end of the session: {result.finish_seconds:.1f} s, "
+        f"CPU seconds {result.finish_processor_seconds:.1f}; "
+        f"of the process beside it {result.beside_processor_seconds:.1f}",
         f"{result.num_registered} of {count} photos in the largest model; pose AUC {areas}"
         + ("" if result.bend_share is None else f"; bend {result.bend_share:.2%} of the extent"),
     ]
@@ -144,7 +185,7 @@ def _mib(num_bytes: int | None) -> str:
 def main() -> int:
     try:
         with unfailing_streams():
-            run(parse())
+            run(parse(), sys.argv[1:])
     except SfmFrontError as error:
         print(f"benchmark_stream: {error}", file=sys.stderr)
         return 2

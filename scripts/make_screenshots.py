@@ -1,4 +1,4 @@
-"""Make the guides' pictures of the live page: python scripts/make_screenshots.py [FOLDER].
+"""Make the guides' pictures of the live page and the report: python scripts/make_screenshots.py.
 
 FOLDER holds photos (default: the sample). Needs the extra test and the system's Chromium, which
 draws by the processor. Takes half a minute on two cores.
@@ -54,6 +54,9 @@ def main() -> int:
             _choose_photo(tab, place=count // 2)
             tab.get_by_role("tab", name="Times").click()
             _take(tab, arguments.out / "live_finished.jpg")
+        report = browser.new_page(viewport=_SIZE, color_scheme="light")
+        report.goto((output / "report.html").as_uri())
+        _take(report, arguments.out / "report.jpg")
     return 0
 
 
@@ -82,7 +85,7 @@ def _running(command: list[str]) -> Iterator[str]:
 
 
 def _tab(browser: Any, address: str) -> Any:
-    tab = browser.new_page(viewport=_SIZE)
+    tab = browser.new_page(viewport=_SIZE, color_scheme="dark")
     # On a slow machine it would draw more and more coarsely.
     tab.goto(f"{address}?fixedDpr=1")
     return tab

@@ -17,8 +17,7 @@ from time import perf_counter
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from sfm_front.cli.progress import CountLine
-from sfm_front.errors import ConfigError, SfmFrontError
-from sfm_front.evaluation.machine import machine
+from sfm_front.errors import ConfigError
 from sfm_front.evaluation.reconstruction.scenes import BenchmarkScene
 from sfm_front.evaluation.tuning.arrangements import ARRANGEMENTS, check_arrangements
 from sfm_front.evaluation.tuning.constants import CONSTANTS, Sweep, make_sweep
@@ -26,12 +25,11 @@ from sfm_front.evaluation.tuning.scene_arguments import (
     add_scene_arguments,
     chosen_options,
     chosen_scenes,
-    chosen_settings,
 )
+from sfm_front.evaluation.tuning.scene_script import exit_status, write_figures
 from sfm_front.evaluation.tuning.table import format_sweep
 from sfm_front.evaluation.tuning.trials import Trials, counter, describe, num_photos, try_scene
 from sfm_front.reports.words import clock
-from sfm_front.storage.json_files import write_json
 
 
 def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
@@ -75,10 +73,6 @@ def run(args: argparse.Namespace) -> None:
     progress = CountLine("photo", sys.stderr)
     total = sum(num_photos(scene, arrangements, len(options)) for scene in scenes)
     count = counter(progress.show, total)
-
-    import pycolmap
-
-    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value  # a line per failed step
     trials: Trials = {}
     done: list[BenchmarkScene] = []
     try:
@@ -88,8 +82,7 @@ def run(args: argparse.Namespace) -> None:
             trials |= try_scene(scene, described, arrangements, options, count)
             done.append(scene)
             progress.note(f"{scene.name}: tried in {clock(perf_counter() - started)}")
-            if args.json:
-                write_json(args.json, as_dict(args, sweeps, trials))
+            write_figures(args, "options", as_rows(sweeps, trials))
     except KeyboardInterrupt:
         if not done:
             raise
@@ -100,36 +93,24 @@ def run(args: argparse.Namespace) -> None:
         print("\n" + format_sweep(sweep, trials))
 
 
-def as_dict(args: argparse.Namespace, sweeps: Sequence[Sweep], trials: Trials) -> dict[str, object]:
-    return {
-        "settings": chosen_settings(args),
-        "machine": machine(),
-        "options": [
-            {
-                "path": sweep.path,
-                "current": sweep.current,
-                "trials": [
-                    {"value": value, **asdict(trial)}
-                    for value, options in sweep.options.items()
-                    for key, trial in trials.items()
-                    if key.options == options
-                ],
-            }
-            for sweep in sweeps
-        ],
-    }
+def as_rows(sweeps: Sequence[Sweep], trials: Trials) -> list[dict[str, object]]:
+    return [
+        {
+            "path": sweep.path,
+            "current": sweep.current,
+            "trials": [
+                {"value": value, **asdict(trial)}
+                for value, options in sweep.options.items()
+                for key, trial in trials.items()
+                if key.options == options
+            ],
+        }
+        for sweep in sweeps
+    ]
 
 
 def main() -> int:
-    try:
-        run(parse())
-    except SfmFrontError as error:
-        print(f"tune: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("tune: interrupted before the first scene was done", file=sys.stderr)
-        return 130
-    return 0
+    return exit_status("tune", parse, run)
 
 
 if __name__ == "__main__":

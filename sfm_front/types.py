@@ -211,11 +211,25 @@ class RankedCandidate:
 
 
 class WaitingReason(Enum):
-    """How the words begin that say why a photo is in no model."""
+    """Why a photo is in no model."""
 
     NO_MATCHES = "no verified matches with any photo"
     NEIGHBORS_WAIT = "verified matches only with photos that are not registered"
-    NO_POSE = "no pose fits"
+    NO_POSE = "no pose fits the model points it sees"
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A photo is in no model, and why; ``num_seen``: how many points of a model it sees, where no
+    pose fits them."""
+
+    reason: WaitingReason
+    num_seen: int | None = None
+
+    def __str__(self) -> str:
+        if self.num_seen is None:
+            return self.reason.value
+        return f"no pose fits the {self.num_seen} model points it sees"
 
 
 class Rejection(Enum):

@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import shutil
 import time
+from dataclasses import asdict
 from typing import TextIO
 
 from sfm_front.cli.heartbeat import Heartbeat
 from sfm_front.cli.terminal import ERASE, is_terminal, printable
-from sfm_front.events import ControlPointsRefused, Event, FinishingBegan, PhotoAdded
+from sfm_front.events import (
+    ControlPointsRefused,
+    Event,
+    FinishingBegan,
+    ModelRefined,
+    PhotoAdded,
+)
+from sfm_front.reports.event_words import finishing_words
 from sfm_front.reports.words import clock, counted
 from sfm_front.types import Skipped
 
 # Photos without a place for any of them after which one wonders: most models start with three or
 # four, streets with ten.
 _WONDER_AFTER = 12
+# For each photo, the last adjustment of a model takes so many times as long as its refinement
+# before: 1.9 to 8.3 on four scenes of 38 to 75 photos, 3.5 on a synthetic flight of 2000.
+_LAST_ADJUSTMENT = (2.0, 8.0)
+# Whoever reads what will take less has waited for it.
+_WORTH_SAYING_S = 20.0
 _NONE_YET = (
     "no photo is placed yet: a model starts with two that see the same from clearly different "
     "places; they wait, and are tried again"
@@ -76,6 +89,7 @@ class ProgressLine(LiveLine):
         self._is_finishing = False
         self._counts = True
         self._said = ""
+        self._seconds_a_photo: dict[int, float] = {}
         self._heartbeat = Heartbeat(stream)
 
     def expect(self, total: int) -> None:
@@ -88,9 +102,11 @@ class ProgressLine(LiveLine):
         photos come is told; the closing summary has all."""
         if isinstance(event, ControlPointsRefused) and not self._is_finishing:
             self._print(str(event))
+        if isinstance(event, ModelRefined):
+            self._seconds_a_photo[event.model_id] = event.seconds / max(event.num_registered, 1)
         if isinstance(event, FinishingBegan):
             self._is_finishing = True
-            self.step(event.step.value)
+            self._write(self._finishing(event), is_long=True)
         if isinstance(event, Skipped):
             self.note(f"skipped {event.name}: {event}")
         elif isinstance(event, PhotoAdded):
@@ -116,6 +132,17 @@ class ProgressLine(LiveLine):
         if text != self._said:
             self._said = text
             self._write(text)
+
+    def _finishing(self, event: FinishingBegan) -> str:
+        turn = event.turn
+        words = finishing_words(
+            event.step.value, event.number, event.num_steps, None if turn is None else asdict(turn)
+        )
+        seconds_a_photo = self._seconds_a_photo.get(turn.model_id) if turn else None
+        if turn is None or seconds_a_photo is None:
+            return words
+        least, most = (share * seconds_a_photo * turn.num_photos for share in _LAST_ADJUSTMENT)
+        return words if most < _WORTH_SAYING_S else f"{words}, usually {_between(least, most)}"
 
     def step(self, what: str) -> None:
         """A step of the end begins."""
@@ -150,3 +177,10 @@ class CountLine(LiveLine):
 def _pace(started: float, done: int, total: int) -> str:
     seconds = (time.perf_counter() - started) / done
     return f"{seconds:.2f} s a photo  {clock(seconds * (total - done))} left"
+
+
+def _between(least_s: float, most_s: float) -> str:
+    """Half a minute to two, say; in minutes where these say enough."""
+    if least_s < _WORTH_SAYING_S:
+        return f"up to {clock(most_s)}"
+    return f"{clock(least_s)} to {clock(most_s)}"

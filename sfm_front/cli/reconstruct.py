@@ -72,9 +72,10 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
     with leaving_at_signal(1):
         from sfm_front.live_page.extra import scene_if_possible
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
+        from sfm_front.reports.html.beside_session import ReportBesideSession
         from sfm_front.reports.html.page import write_page
         from sfm_front.session.given import GivenSession
-        from sfm_front.session.output_folder import holds_session
+        from sfm_front.session.output_folder import holds_session, told_of_others
         from sfm_front.session.resume import Newcomers, nothing_to_do
         from sfm_front.session.session import Session
 
@@ -92,6 +93,8 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             return 0
         if not arguments.watch and (overwrite or not holds_session(output)):
             _check_control_points(options, photos)
+        if others := told_of_others(output):
+            progress.note(others)
         on_event = _event_printer() if arguments.events else progress.show
         # Also with --quiet: nobody finds the page without its address.
         page = _page(output, progress.keep, opened) if arguments.viewer else None
@@ -122,16 +125,17 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             new = list(newcomers.among(photos, progress.note))
             progress.expect(len(new))
             arriving = new
-        if cluster is not None:
-            assert isinstance(session, GivenSession)
-            result, taken = cluster.reconstruct(session, new, interrupted)
-        else:
-            taken = 0
-            for _ in session.add_all(arriving):
-                taken += 1
-                if interrupted():
-                    break
-            result = session.finish()
+        taken = 0
+        with ReportBesideSession(output):
+            if cluster is not None:
+                assert isinstance(session, GivenSession)
+                result, taken = cluster.reconstruct(session, new, interrupted)
+            else:
+                for _ in session.add_all(arriving):
+                    taken += 1
+                    if interrupted():
+                        break
+                result = session.finish()
         progress.step("drawing the page")
         scene_if_possible(output)
         write_page(output)

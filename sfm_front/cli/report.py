@@ -1,4 +1,7 @@
-"""Make the page of a reconstruction anew: verdict, pictures, plan, accuracy, reasons, times."""
+"""Make the page of a reconstruction anew: verdict, pictures, plan, accuracy, reasons, times.
+
+Of one that still runs, or was stopped, it shows how far that is.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from pathlib import Path
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``report`` on ``parser``."""
-    parser.add_argument("output", type=Path, help="output of a finished reconstruction")
+    parser.add_argument("output", type=Path, help="output of a reconstruction, also while it runs")
     parser.add_argument(
         "--photos",
         type=Path,
@@ -22,8 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
     from sfm_front.live_page.extra import scene_if_possible
     from sfm_front.reports.html.page import write_page
     from sfm_front.reports.report_json import read_report
+    from sfm_front.reports.unfinished import story_if_unfinished
 
-    read_report(arguments.output)  # Of a run that has not ended, nothing is made.
+    if story_if_unfinished(arguments.output) is None:
+        read_report(arguments.output)  # Where no session has been, nothing is made.
     scene = scene_if_possible(arguments.output)
     file = write_page(arguments.output, arguments.photos)  # Has a link to the scene.
     print(file if arguments.quiet else f"wrote {file}: open it in a browser")

@@ -17,10 +17,8 @@ from sfm_front.errors import StorageError
 from sfm_front.georeference.sidecar import FILE_NAME, Sidecar, write_sidecar
 from sfm_front.storage.atomic import sync
 from sfm_front.storage.json_files import write_json
+from sfm_front.storage.written_models import STATE, file_size, file_sizes
 from sfm_front.types import ModelSummary, Uint8Array
-
-STATE = "session.json"
-"""What a session knows beside its models, in their folder."""
 
 POINT_CLOUD = "points3D.ply"
 """The coloured points, beside a model."""
@@ -114,7 +112,7 @@ def _export(
     if sidecar is not None:
         write_sidecar(fresh / FILE_NAME, sidecar)
     if state is not None:
-        write_json(fresh / STATE, {**state, "files": _file_sizes(fresh)})
+        write_json(fresh / STATE, {**state, "files": file_sizes(fresh)})
     _sync_all(fresh)
     _replace(folder)
     return summaries
@@ -140,7 +138,10 @@ def check_written(model: pycolmap.Reconstruction, folder: Path, *, binary: bool 
             for image in map(model.image, model.reg_image_ids())
         )
         points = 8 + 51 * model.num_points3D() + 8 * model.compute_num_observations()
-        whole = _size(folder / "images.bin") == images and _size(folder / "points3D.bin") == points
+        whole = (
+            file_size(folder / "images.bin") == images
+            and file_size(folder / "points3D.bin") == points
+        )
     cloud = folder / POINT_CLOUD
     if whole and cloud.exists():
         _, end, data = cloud.read_bytes().partition(b"end_header\n")
@@ -149,24 +150,6 @@ def check_written(model: pycolmap.Reconstruction, folder: Path, *, binary: bool 
         whole = _is_whole_text(model, folder)
     if not whole:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-def damaged_file(folder: Path, sizes: Mapping[str, int]) -> str | None:
-    """The first file below ``folder`` whose size is not that in ``sizes``; None if all are whole.
-
-    Asked before pycolmap reads a model: of one cut short it may read for ever.
-    """
-    return next((name for name, size in sizes.items() if _size(folder / name) != size), None)
-
-
-def _file_sizes(folder: Path) -> dict[str, int]:
-    return {
-        file.relative_to(folder).as_posix(): _size(file) for file in sorted(folder.rglob("*.bin"))
-    }
-
-
-def _size(file: Path) -> int:
-    return file.stat().st_size if file.exists() else 0
 
 
 def _is_whole_text(model: pycolmap.Reconstruction, folder: Path) -> bool:

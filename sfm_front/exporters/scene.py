@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,6 @@ from pathlib import Path
 import pycolmap
 
 from sfm_front.errors import InputError
-from sfm_front.exporters.colmap import STATE, damaged_file
 from sfm_front.exporters.options import ExportOptions
 from sfm_front.geometry.enu import LocalFrame
 from sfm_front.georeference.sidecar import FILE_NAME, read_sidecar
@@ -18,6 +16,7 @@ from sfm_front.photos.source import files_by_name
 from sfm_front.storage.colmap_models import find_models, is_model, read_model
 from sfm_front.storage.database import DATABASE
 from sfm_front.storage.session_photos import read_photos
+from sfm_front.storage.written_models import damaged_file, read_state
 from sfm_front.types import GeoPosition
 
 Progress = Callable[[int, int], None]
@@ -98,8 +97,7 @@ def _read_model(source: Path, number: int | None) -> tuple[Path, pycolmap.Recons
 def _check_whole(sparse: Path) -> None:
     """pycolmap may read for ever if a session's model was cut short."""
     try:
-        sizes = json.loads((sparse / STATE).read_text(encoding="utf-8"))["files"]
-        damaged = damaged_file(sparse, sizes)
+        damaged = damaged_file(sparse, read_state(sparse)["files"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return
     if damaged is not None:

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sfm_front.errors import InputError
-from sfm_front.live_page.event_tail import EventTail
 from sfm_front.live_page.model_shapes import ModelReader, Models, ModelShape
-from sfm_front.live_page.story import PhotoState, PhotoStory, Story
 from sfm_front.reports import event_log, report_json
+from sfm_front.reports.event_tail import EventTail
 from sfm_front.reports.run_summary import RunSummary
+from sfm_front.reports.story import GIVEN_UP, PhotoState, PhotoStory, Story
 from sfm_front.reports.verdict import Verdict, verdict
 from sfm_front.storage.colmap_models import is_model
-
-_GIVEN_UP = "its model was given up"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +127,7 @@ class OutputFollower:
             # The models that hold it are still to be written.
             return Outcome(photo, PhotoState.PLACED, None)
         if photo.state is PhotoState.PLACED:
-            return Outcome(photo, PhotoState.WAITING, None, _GIVEN_UP, hint)
+            return Outcome(photo, PhotoState.WAITING, None, GIVEN_UP, hint)
         return Outcome(photo, photo.state, None, photo.reason, hint)
 
     def _read_summary(self) -> RunSummary | None:

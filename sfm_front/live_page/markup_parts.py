@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sfm_front.live_page import palette
 from sfm_front.live_page.follower import Outcome, Seen
-from sfm_front.live_page.story import PhotoState
 from sfm_front.reports.html.markup import Html, tag
+from sfm_front.reports.story import PhotoState
 from sfm_front.reports.words import counted
 
 SCROLL = "max-height:52vh;overflow:auto;font-size:.82em"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +12,9 @@ import pycolmap
 from numpy.typing import NDArray
 
 from sfm_front.errors import InputError
-from sfm_front.exporters.colmap import STATE, damaged_file
 from sfm_front.georeference.sidecar import FILE_NAME, read_sidecar
 from sfm_front.storage.colmap_models import find_models, read_model
+from sfm_front.storage.written_models import STATE, damaged_file, read_state
 from sfm_front.types import Float64Array, Uint8Array
 
 # Points outside the middle 98 % by more than this many diagonals of their box are not drawn.
@@ -69,7 +68,7 @@ class ModelReader:
         if version is None or version == self._seen:
             return None
         try:
-            content = _state(self._folder)
+            content = read_state(self._folder)
             if damaged_file(self._folder, content.get("files", {})) is not None:
                 return None
             in_enu = _in_enu(self._folder)
@@ -98,15 +97,6 @@ class ModelReader:
             return tuple(sorted(file.stat().st_mtime_ns for file in files)) or None
         except OSError:
             return None
-
-
-def _state(folder: Path) -> dict[str, Any]:
-    """What a session says of its models; empty if none wrote them."""
-    file = folder / STATE
-    content = json.loads(file.read_bytes()) if file.exists() else {}
-    if not isinstance(content, dict):
-        raise ValueError(f"{file} is not a session's")
-    return content
 
 
 def _folders(folder: Path, content: dict[str, Any]) -> list[tuple[Path, int]]:

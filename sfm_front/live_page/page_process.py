@@ -6,16 +6,15 @@ page stays while a browser shows it. It ends with its session's process in any c
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 import time
 import zlib  # noqa: F401  (before pycolmap)
-from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
 
 from sfm_front.live_page.server import LivePage
+from sfm_front.runtime.priority import let_others_first
 
 # A page that is loaded anew is without its browser for a moment.
 _PATIENCE_S = 3.0
@@ -24,7 +23,7 @@ _NICE = 10
 
 def main(output: Path, port: int) -> None:
     """Serve the page until it is no longer wanted."""
-    _let_photos_come_first()
+    let_others_first(_NICE)
     has_ended, is_alone = Event(), Event()
     Thread(target=_listen, args=(has_ended, is_alone), daemon=True).start()
     last_seen_s = float("-inf")
@@ -42,15 +41,6 @@ def main(output: Path, port: int) -> None:
             return is_alone.is_set() or (has_ended.is_set() and forsaken)
 
         page.run(is_unwanted)
-
-
-def _let_photos_come_first() -> None:
-    """Take what processor time the session leaves."""
-    if hasattr(os, "nice"):
-        os.nice(_NICE)
-    # Linux shares the processor between groups of processes first, and this is one of its own.
-    with suppress(OSError):
-        Path("/proc/self/autogroup").write_text(str(_NICE))
 
 
 def _listen(has_ended: Event, is_alone: Event) -> None:

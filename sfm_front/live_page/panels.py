@@ -15,6 +15,7 @@ from sfm_front.live_page.scene_drawing import SceneDrawing
 
 _WIDTH_PX = 400
 _NEWEST_PX = 480
+_LIGHT, _DARK = "light", "dark"
 _ABOUT_TIMES = "Seconds of work a photo, by stage; reading and features run ahead."
 
 
@@ -96,11 +97,15 @@ def _add_choices(
     frusta = gui.add_checkbox("Cameras", True)
     links = gui.add_checkbox("Links of the newest, weak links", True)
     all_links = gui.add_checkbox("All links", False)
-    dark = gui.add_checkbox("Dark", True)
+    colours = gui.add_button_group("Colours", (_LIGHT, _DARK))
 
     def see_all(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
         if event.client is not None:
             on_show_all(event.client)
+
+    def choose_colours(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+        if event.client is not None:
+            set_theme(event.client.gui, dark=colours.value == _DARK)
 
     def choose(_: object) -> None:
         drawing.point_scale = size.value
@@ -109,11 +114,11 @@ def _add_choices(
         on_change()
 
     show_all.on_click(see_all)
-    dark.on_update(lambda _: set_theme(gui, dark=dark.value))
+    colours.on_click(choose_colours)
     for choice in (size, frusta, links, all_links):
         choice.on_update(choose)
 
 
 def set_theme(gui: viser.GuiApi, *, dark: bool) -> None:
-    """Of all browsers; nothing of the page can be shared beyond this machine."""
+    """Of one browser, or of all; nothing of the page can be shared beyond this machine."""
     gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from sfm_front.geometry.exif_orientation import QUARTER_TURNS
-from sfm_front.live_page.story import Story
 from sfm_front.photos.exif import read_exif
+from sfm_front.reports.story import Story
 from sfm_front.storage.database import DATABASE
 from sfm_front.storage.photo_pairs import num_inliers, photo_file, verified_matches
 from sfm_front.types import Uint8Array

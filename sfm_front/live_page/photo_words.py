@@ -5,13 +5,14 @@ All text is escaped: photos are called whatever their makers like.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from sfm_front.live_page import palette
+from sfm_front.live_page.browser_signals import clickable, photo_row
 from sfm_front.live_page.follower import Outcome, Seen
 from sfm_front.live_page.markup_parts import NAME, PADDED, ROW, SCROLL, dot, what_became
-from sfm_front.live_page.story import PhotoState
 from sfm_front.reports.html.markup import Html, tag
+from sfm_front.reports.story import PhotoState
 from sfm_front.reports.words import counted
 
 # Rows of a list; more would take a browser longer than a second to lay out.
@@ -20,26 +21,31 @@ _MOST_ROWS = 300
 
 def photo_list(seen: Seen) -> Html:
     """Each photo and what became of it, the latest first; of many, all that are not placed."""
-    outcomes = list(seen.outcomes.values())
+    outcomes = list(enumerate(seen.outcomes.values()))
     shown = outcomes[-_MOST_ROWS:]
-    early = [one for one in outcomes[:-_MOST_ROWS] if one.state is not PhotoState.PLACED]
+    early = [one for one in outcomes[:-_MOST_ROWS] if one[1].state is not PhotoState.PLACED]
     left_out = len(outcomes) - len(shown) - len(early)
-    rows = [_row(seen, one) for one in reversed([*early[-_MOST_ROWS:], *shown])]
+    rows = [_row(seen, *one) for one in reversed([*early[-_MOST_ROWS:], *shown])]
     more = tag("div", f"and {left_out} more that are placed") if left_out else None
-    return tag("div", tag("div", *rows, more, style=SCROLL), style="padding:.5em .8em")
+    return tag("div", clickable(*rows, more, style=SCROLL), style="padding:.5em .8em")
 
 
 def gaps(seen: Seen) -> Html:
     """Where photos are missing: those that wait, and those that few others hold."""
     waiting, weak = seen.named(PhotoState.WAITING), seen.weak
+    number_of = {name: number for number, name in enumerate(seen.outcomes)}
+
+    def rows(outcomes: Sequence[Outcome], where: Callable[[Outcome], str]) -> list[Html]:
+        return [_gap(number_of[one.photo.name], one, where(one)) for one in outcomes[:_MOST_ROWS]]
+
     parts: list[Html] = []
     if waiting:
         parts.append(tag("b", f"{counted(len(waiting), 'photo')} in no model"))
-        parts += [_gap(one, _near(one)) for one in waiting[:_MOST_ROWS]]
+        parts += rows(waiting, _near)
     if weak:
         few = f"{counted(len(weak), 'photo')} that fewer than {seen.story.few_pairs} others hold"
         parts.append(tag("b", few))
-        parts += [_gap(one, _held_by(one)) for one in weak[:_MOST_ROWS]]
+        parts += rows(weak, _held_by)
     if len(seen.models) > 1:
         sizes = ", ".join(str(len(shape.image_ids)) for shape in seen.models)
         parts.append(
@@ -51,7 +57,7 @@ def gaps(seen: Seen) -> Html:
         )
     if not parts:
         parts.append(tag("div", "None: every photo is in one model, and several others hold it."))
-    return tag("div", tag("div", *parts, style=SCROLL), style="padding:.5em .8em")
+    return tag("div", clickable(*parts, style=SCROLL), style="padding:.5em .8em")
 
 
 def photo_figures(
@@ -91,24 +97,24 @@ def _bar(name: str, count: int, most: int) -> Html:
     )
 
 
-def _row(seen: Seen, outcome: Outcome) -> Html:
+def _row(seen: Seen, number: int, outcome: Outcome) -> Html:
     color = {
         PhotoState.PLACED: palette.WEAK
         if outcome.is_weak
         else palette.of_model(outcome.model or 0),
         PhotoState.WAITING: palette.WAITING,
     }.get(outcome.state, palette.FAINT)
-    return tag(
-        "div",
+    return photo_row(
+        number,
         tag("span", dot(color, outcome.photo.name), style=NAME, title=outcome.photo.name),
         tag("span", what_became(seen, outcome), style="flex:1"),
         style=ROW,
     )
 
 
-def _gap(outcome: Outcome, where: str) -> Html:
-    return tag(
-        "div",
+def _gap(number: int, outcome: Outcome, where: str) -> Html:
+    return photo_row(
+        number,
         tag("div", outcome.photo.name, style="font-weight:600;overflow-wrap:anywhere"),
         tag("div", where, style="overflow-wrap:anywhere;opacity:.85"),
         style="padding:.3em 0;border-bottom:1px solid rgba(128,134,145,.18)",

@@ -11,7 +11,7 @@ from sfm_front.live_page import palette
 from sfm_front.live_page.arrangement import Arrangement, Placement
 from sfm_front.live_page.follower import Outcome, Seen
 from sfm_front.live_page.model_shapes import ModelShape
-from sfm_front.live_page.story import PhotoState
+from sfm_front.reports.story import PhotoState
 from sfm_front.types import Float64Array, Uint8Array
 from sfm_front.viewers.model_drawing import frustum_size
 

@@ -14,6 +14,7 @@ import viser
 
 from sfm_front.live_page.access import keep_private
 from sfm_front.live_page.address import FIRST_PORT, HOST
+from sfm_front.live_page.browser_signals import BrowserSignals
 from sfm_front.live_page.browser_view import BrowserView, set_first_view
 from sfm_front.live_page.follower import OutputFollower, Seen
 from sfm_front.live_page.panels import MainPanel, set_theme
@@ -113,6 +114,11 @@ class LivePage(Closeable):
     def _welcome(self, client: viser.ClientHandle) -> None:
         panel = PhotoPanel(client, self._pictures)
         view = BrowserView(client, self._server.initial_camera.position)
+        BrowserSignals(
+            client,
+            on_photo=lambda number: self._open_numbered(client.client_id, number),
+            on_theme=lambda dark: set_theme(client.gui, dark=dark),
+        )
         with self._lock:
             self._views[client.client_id] = view
             self._photo_panels[client.client_id] = panel
@@ -139,6 +145,13 @@ class LivePage(Closeable):
         place = cameras.along(np.array(event.ray_origin), np.array(event.ray_direction))
         if place is not None:
             panel.open(cameras.names[place])
+
+    def _open_numbered(self, client_id: int, number: int) -> None:
+        """By the number of a row in a list."""
+        panel, state = self._photo_panels.get(client_id), self._state
+        names = [] if state is None else list(state[0].outcomes)
+        if panel is not None and number < len(names):
+            panel.open(names[number])
 
 
 def _title(output: Path) -> str:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from viser import uplot
 
-from sfm_front.live_page.story import PhotoStory
 from sfm_front.reports.html.stage_times import OTHER, STAGE_GROUPS
+from sfm_front.reports.story import PhotoStory
 from sfm_front.types import Float64Array
 
 # More photos share columns.

@@ -10,8 +10,8 @@ import time
 from sfm_front.live_page import palette
 from sfm_front.live_page.follower import Seen
 from sfm_front.live_page.markup_parts import PADDED, ROW, SCROLL, dot, what_became
-from sfm_front.live_page.story import PhotoState
 from sfm_front.reports.html.markup import Html, joined, tag
+from sfm_front.reports.story import PhotoState
 from sfm_front.reports.verdict import Verdict
 from sfm_front.reports.words import clock, counted
 
@@ -77,6 +77,9 @@ def _status(seen: Seen, now: float) -> Html:
     if story.ended is False:
         return joined([dot(palette.WAITING, tag("b", "stopped")), f" after {lasted}"])
     silent_s = now - story.last
+    if story.step:
+        # In one step there may be nothing to tell for minutes.
+        return dot(palette.NEWEST, joined([tag("b", story.step), f" for {clock(silent_s)}"]))
     if silent_s > _SILENT_S:
         return joined(
             [dot(palette.WEAK, tag("b", "running")), f", nothing new for {clock(silent_s)}"]

@@ -26,7 +26,7 @@ from sfm_front.mapping.mapper_options import MapperOptions
 from sfm_front.mapping.model import Model
 from sfm_front.mapping.model_state import ModelState
 from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.types import PairGeometry, View, WaitingReason
+from sfm_front.types import PairGeometry, View, Waiting, WaitingReason
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,15 +160,15 @@ class Atlas:
         """3-D points of all models."""
         return sum(model.num_points for model in self.models)
 
-    def why_not_registered(self, image_id: int) -> str:
-        """What keeps a waiting photo out of the models, in words."""
+    def why_not_registered(self, image_id: int) -> Waiting:
+        """What keeps a waiting photo out of the models."""
         neighbors = self.view_graph.neighbors(image_id).keys()
         if not neighbors:
-            return WaitingReason.NO_MATCHES.value
+            return Waiting(WaitingReason.NO_MATCHES)
         if not neighbors & self.registered:
-            return WaitingReason.NEIGHBORS_WAIT.value
+            return Waiting(WaitingReason.NEIGHBORS_WAIT)
         seen = max(model.num_visible_points(image_id) for model in self.models)
-        return f"{WaitingReason.NO_POSE.value} the {seen} model points it sees"
+        return Waiting(WaitingReason.NO_POSE, seen)
 
     def add(self, image_id: int) -> list[int]:
         """Take in a photo of the view graph and place all that can be placed.

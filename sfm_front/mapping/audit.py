@@ -19,7 +19,6 @@ from sfm_front.mapping.covisibility import (
     BoolArray,
     Covisibility,
     IndexArray,
-    halves,
     parts,
 )
 from sfm_front.mapping.view_graph import ViewGraph
@@ -69,7 +68,7 @@ def audit(reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> Mod
         covisibility = Covisibility.of(reconstruction, min_observers=2)
         image_ids = covisibility.image_ids
         ends = np.searchsorted(image_ids, found.pairs)
-        for beyond in halves(covisibility.num_shared()):
+        for beyond in covisibility.sharing().halves():
             crossing = beyond[ends[:, 0]] != beyond[ends[:, 1]]
             share = found.against[crossing].sum() / max(1, found.speaking[crossing].sum())
             if share > worst_share:

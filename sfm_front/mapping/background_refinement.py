@@ -61,7 +61,7 @@ class BackgroundAdjuster(Closeable):
             # The photos that come meanwhile need the others.
             num_threads=max(1, options.num_threads // 2),
             refine_intrinsics=options.refine_intrinsics,
-            min_coverage_gain=options.min_coverage_gain,
+            min_coverage_gain=options.coverage_gain(reconstruction.num_reg_images()),
         )
         assert process.stdin is not None
         try:

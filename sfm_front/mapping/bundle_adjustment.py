@@ -10,6 +10,7 @@ import pycolmap
 
 from sfm_front.errors import ConfigError
 from sfm_front.mapping.refinement_schedule import LARGE
+from sfm_front.mapping.thinned_adjustment import adjust_thinned
 
 # In one model.
 _MOST_PHOTOS = 1_000_000
@@ -24,9 +25,9 @@ class RobustAdjustmentOptions:
     # Reprojection error from which the Cauchy loss gives way (TUNING: robust-loss).
     loss_scale_px: float = 1.0
     # Relative change of the cost at which it stops, and that for large models: long flights stay
-    # bent with the looser one (TUNING: robust-tolerance).
+    # bent with looser ones (TUNING: robust-tolerance, large-tolerances).
     tolerance: float = 1e-4
-    large_tolerance: float = 1e-7
+    large_tolerance: float = 1e-8
     # Whether focal length and distortion may move, and the principal point of an unknown camera.
     refine_intrinsics: bool = True
     num_threads: int = 2
@@ -87,15 +88,20 @@ def solved_directly(
 def adjust_all(
     reconstruction: pycolmap.Reconstruction, adjustment: pycolmap.BundleAdjustmentOptions
 ) -> None:
-    """Adjust all registered photos and their points, two cameras fixing the gauge.
+    """Adjust all registered photos and their points, two cameras fixing the gauge; a large model by
+    some of its points, see ``thinned_adjustment``.
 
     As ``pycolmap.bundle_adjustment``, which prints about it whatever the log level.
     """
-    config = pycolmap.BundleAdjustmentConfig()
-    for image_id in reconstruction.reg_image_ids():
-        config.add_image(image_id)
-    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    pycolmap.create_default_bundle_adjuster(adjustment, config, reconstruction).solve()
+
+    def adjust(model: pycolmap.Reconstruction) -> None:
+        config = pycolmap.BundleAdjustmentConfig()
+        for image_id in model.reg_image_ids():
+            config.add_image(image_id)
+        config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+        pycolmap.create_default_bundle_adjuster(adjustment, config, model).solve()
+
+    adjust_thinned(reconstruction, adjustment, adjust)
 
 
 def median_error(

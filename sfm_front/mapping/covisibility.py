@@ -55,21 +55,25 @@ class Covisibility:
             ),
         )
 
-    def num_shared(self) -> IndexArray:
-        """(N, N) how many points two photos share; on the diagonal, how many each observes."""
+    def sharing(self) -> Sharing:
+        """Which photos share points."""
         num_photos = len(self.image_ids)
         photo = np.repeat(np.arange(num_photos), [len(seen) for seen in self.observed])
         point = np.concatenate([*self.observed, np.zeros(0, np.int64)])
         observers = photo[np.argsort(point, kind="stable")]
         track_length = np.bincount(point, minlength=len(self.points))
         end = np.cumsum(track_length)
-        shared = np.zeros((num_photos, num_photos), np.int64)
+        others, counts = [], []
         for number, seen in enumerate(self.observed):
             length = track_length[seen]
             # Places in ``observers`` of all tracks of the photo's points, one after another.
             places = np.arange(length.sum()) + np.repeat(end[seen] - np.cumsum(length), length)
-            shared[number] = np.bincount(observers[places], minlength=num_photos)
-        return shared
+            shared = np.bincount(observers[places], minlength=num_photos)
+            shared[number] = 0
+            others.append(np.flatnonzero(shared))
+            counts.append(shared[others[-1]])
+        own = np.array([len(seen) for seen in self.observed], np.int64)
+        return Sharing(own, tuple(others), tuple(counts))
 
     def seen_by(self, photos: BoolArray) -> BoolArray:
         """(P,) whether any of the photos (N,) observes a point."""
@@ -79,30 +83,45 @@ class Covisibility:
         return seen
 
 
-def halves(num_shared: IndexArray) -> Iterator[BoolArray]:
-    """The two parts that each edge of a spanning tree joins: (N,) True for the photos beyond it.
+@dataclass(frozen=True, eq=False)
+class Sharing:
+    """How many points each of N photos observes, ``own`` (N,); for each the ``others`` that share
+    some of them, sorted, and how many, ``counts``. A flight's photos share with few others each."""
 
-    The tree joins photos that share most of what either observes. ``num_shared`` (N, N): see
-    ``Covisibility``.
-    """
-    own = num_shared.diagonal()
-    if len(own) == 0:
-        return
-    overlap = num_shared / np.maximum(own[:, None] + own[None, :] - num_shared, 1)
-    num_photos = len(own)
-    nearest, closest = np.zeros(num_photos, np.int64), overlap[0].copy()
-    closest[0] = -1
-    order = []
-    for _ in range(num_photos - 1):
-        photo = int(np.argmax(closest))
-        order.append(photo)
-        closest[photo] = -1
-        closer = (overlap[photo] > closest) & (closest >= 0)
-        nearest[closer], closest[closer] = photo, overlap[photo, closer]
-    beyond = np.eye(num_photos, dtype=np.bool_)
-    for photo in reversed(order):
-        beyond[nearest[photo]] |= beyond[photo]
-        yield beyond[photo]
+    own: IndexArray
+    others: tuple[IndexArray, ...]
+    counts: tuple[IndexArray, ...]
+
+    def pairs(self, min_shared: int) -> IndexArray:
+        """(K, 2) photos that share so many points, those that share most first."""
+        first = np.repeat(np.arange(len(self.own)), [len(others) for others in self.others])
+        second = np.concatenate([*self.others, np.zeros(0, np.int64)])
+        counts = np.concatenate([*self.counts, np.zeros(0, np.int64)])
+        kept = np.flatnonzero((first < second) & (counts >= min_shared))
+        kept = kept[np.argsort(-counts[kept], kind="stable")]
+        return np.column_stack([first[kept], second[kept]])
+
+    def halves(self) -> Iterator[BoolArray]:
+        """The two parts that each edge of a spanning tree joins: (N,) True for the photos beyond
+        it. The tree joins photos that share most of what either observes."""
+        num_photos = len(self.own)
+        if num_photos == 0:
+            return
+        # Of the photos not in the tree: the nearest that is, and the overlap with it; else -1.
+        nearest, closest = np.zeros(num_photos, np.int64), np.zeros(num_photos)
+        order, photo = [], 0
+        for _ in range(num_photos - 1):
+            closest[photo] = -1
+            others, shared = self.others[photo], self.counts[photo]
+            overlap = shared / (self.own[photo] + self.own[others] - shared)
+            closer = (overlap > closest[others]) & (closest[others] >= 0)
+            nearest[others[closer]], closest[others[closer]] = photo, overlap[closer]
+            photo = int(np.argmax(closest))
+            order.append(photo)
+        beyond = np.eye(num_photos, dtype=np.bool_)
+        for photo in reversed(order):
+            beyond[nearest[photo]] |= beyond[photo]
+            yield beyond[photo]
 
 
 def parts(image_ids: IndexArray, beyond: BoolArray) -> tuple[tuple[int, ...], tuple[int, ...]]:

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from typing import Protocol
 
-from sfm_front.events import DropReason, FinishingStep, RegisteredStructureLess, StartKind
+from sfm_front.events import (
+    DropReason,
+    FinishingStep,
+    ModelTurn,
+    RegisteredStructureLess,
+    StartKind,
+)
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.initialization import Initializer
 from sfm_front.mapping.model import Model
@@ -13,16 +20,23 @@ from sfm_front.mapping.restart import Restart
 from sfm_front.mapping.unfolding import unfold
 
 
+class OnStep(Protocol):
+    """Hears that a step begins, or the turn of a model in it."""
+
+    def __call__(self, step: FinishingStep, turn: ModelTurn | None = None, /) -> None: ...
+
+
 def finish(
     atlas: Atlas,
     restart: Restart | None = None,
     before_last: Callable[[], None] = lambda: None,
-    on_step: Callable[[FinishingStep], None] = lambda _step: None,
+    on_step: OnStep = lambda _step, _turn=None: None,
 ) -> None:
     """Retry what waits, restart where the stream began badly, refine everything.
 
     ``restart``: the one that may be under way. ``before_last`` is called before the last adjustment
-    of the models, ``on_step`` with each step when it begins. They cannot grow any more after this.
+    of the models, ``on_step`` with each step when it begins, in the last adjustment with each model
+    when that is taken up. They cannot grow any more after this.
     """
     _Finishing(atlas, restart or Restart(atlas), before_last, on_step).run()
 
@@ -30,7 +44,7 @@ def finish(
 def place_all(atlas: Atlas) -> None:
     """The first part of it alone: all that waits and can be placed has a place then. The models
     can grow on."""
-    _Finishing(atlas, Restart(atlas), lambda: None, lambda _step: None).place_all()
+    _Finishing(atlas, Restart(atlas), lambda: None, lambda _step, _turn=None: None).place_all()
 
 
 class _Finishing:
@@ -39,7 +53,7 @@ class _Finishing:
         atlas: Atlas,
         restart: Restart,
         before_last: Callable[[], None],
-        on_step: Callable[[FinishingStep], None],
+        on_step: OnStep,
     ) -> None:
         self._atlas = atlas
         self._before_last = before_last
@@ -64,8 +78,10 @@ class _Finishing:
         for model in self._atlas.models:
             model.leave_refinement()
         self._before_last()
-        self._on_step(FinishingStep.LAST_ADJUSTMENT)
-        for model in self._atlas.models:
+        models = self._atlas.models
+        for number, model in enumerate(models, start=1):
+            turn = ModelTurn(model.model_id, number, len(models), model.num_registered)
+            self._on_step(FinishingStep.LAST_ADJUSTMENT, turn)
             model.finish()
         self._drop_without_pairs()
         self._atlas.drop_covered()

@@ -120,13 +120,13 @@ def _count_bridges(
     """Two models by their numbers → photos that are in both, or have pairs into the one and are in
     the other or in none. Those in the first model alone are not looked at: their pairs are seen
     from the other end."""
+    bridges: Counter[tuple[int, int]] = Counter()
+    if len(registered) < 2:
+        return bridges
     models_of: defaultdict[int, set[int]] = defaultdict(set)
     for number, image_ids in enumerate(registered):
         for image_id in image_ids:
             models_of[image_id].add(number)
-    bridges: Counter[tuple[int, int]] = Counter()
-    if len(registered) < 2:
-        return bridges
     for image_id in view_graph.image_ids:
         mine = models_of.get(image_id, set())
         if mine == {0}:

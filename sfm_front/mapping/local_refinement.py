@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import pycolmap
 
 from sfm_front.errors import ConfigError
+
+Part = Callable[
+    [pycolmap.Reconstruction, Collection[int], Collection[int]], pycolmap.Reconstruction
+]
+"""Model, photos and points → a model of these and of what is around them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,31 +22,44 @@ class LocalRefinementOptions:
     # A model of this many photos refines two new ones at a time, of twice as many three: keeps the
     # cost per photo constant (TUNING: local-batch).
     photos_per_batch: int = 250
+    # No more than this many at a time: those that wait are where others put them, and what comes
+    # next does not fit them. From the model that would take more on, the neighbourhood is refined
+    # apart from it.
+    max_batch: int = 4
     # Points in more photos than this stay fixed: they hardly move, and would pull all photos in.
     max_track_length: int = 15
 
     def __post_init__(self) -> None:
-        for name in ("photos_per_batch", "max_track_length"):
+        for name in ("photos_per_batch", "max_batch", "max_track_length"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
 
     def batch_size(self, num_images: int) -> int:
         """Number of new photos that share a local refinement in a model of this size."""
-        return 1 + num_images // self.photos_per_batch
+        return min(self.max_batch, 1 + num_images // self.photos_per_batch)
+
+    def is_apart(self, num_images: int) -> bool:
+        """Whether the neighbourhood is refined apart from a model of this size."""
+        return num_images >= self.max_batch * self.photos_per_batch
 
 
 class LocalRefinement:
     """COLMAP's local refinement, per photo or, in a large model, per batch of photos.
 
     COLMAP first checks the whole model for consistency, which takes longer as it grows. A batch
-    shares that check, so that the cost per photo stays constant (TUNING: local-batch).
+    shares that check, so that the cost per photo stays constant (TUNING: local-batch). In a huge
+    one the neighbourhood is taken out, refined as a model of its own, and put back: with the same
+    result, for what is around it stands fixed either way.
     """
 
     def __init__(
         self,
         pipeline: pycolmap.IncrementalPipelineOptions,
         options: LocalRefinementOptions | None = None,
+        part: Part | None = None,
     ) -> None:
+        """``part``: as ``ViewGraph.part``; without, nothing is taken out."""
+        self._part = part
         self._options = options or LocalRefinementOptions()
         self._mapping = pipeline.get_mapper()
         self._triangulation = pipeline.get_triangulation()
@@ -92,7 +111,26 @@ class LocalRefinement:
                 config.set_constant_cam_intrinsics(camera_id)
         for point_id in points:
             config.add_variable_point(point_id)
-        pycolmap.create_default_bundle_adjuster(self._adjustment, config, model).solve()
+        if self._part is None or not self._options.is_apart(model.num_reg_images()):
+            pycolmap.create_default_bundle_adjuster(self._adjustment, config, model).solve()
+            return
+        apart = self._part(model, bundle, points)
+        pycolmap.create_default_bundle_adjuster(self._adjustment, config, apart).solve()
+        _put_back(apart, model, bundle)
 
     def _is_short(self, point: pycolmap.Point3D) -> bool:
         return not point.has_error() or point.track.length() <= self._options.max_track_length
+
+
+def _put_back(
+    apart: pycolmap.Reconstruction, model: pycolmap.Reconstruction, image_ids: Collection[int]
+) -> None:
+    """Take over poses of these photos, and all points and cameras: those that stood fixed are as
+    they were."""
+    for image_id in image_ids:
+        pose = apart.image(image_id).cam_from_world()
+        model.frame(model.image(image_id).frame_id).rig_from_world = pose
+    for point_id, point in apart.points3D.items():
+        model.point3D(point_id).xyz = point.xyz
+    for camera_id, camera in apart.cameras.items():
+        model.camera(camera_id).params = camera.params

@@ -10,6 +10,10 @@ compared. A point that a photo happens to miss does not count: nobody in the who
 have seen it. What is counted are missing correspondences as in Zach, Irschara and Bischof, "What
 Can Missing Correspondences Tell Us About 3D Structure and Motion?", CVPR 2008, by area; both parts
 must miss some, for one alone may be out of focus, or behind something.
+
+Nor does a point that a verified match says the other photo sees, about where it should: where two
+ends of a long way round meet, each has points of its own of the same things, as far apart as the
+model has drifted (TUNING: fold-drift).
 """
 
 from __future__ import annotations
@@ -21,8 +25,12 @@ import pycolmap
 
 from sfm_front.errors import ConfigError
 from sfm_front.geometry.posed_camera import PosedCamera
-from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, halves, parts
-from sfm_front.mapping.photo_grid import cells_of, occupied, widened
+from sfm_front.mapping.covisibility import BoolArray, Covisibility, IndexArray, parts
+from sfm_front.mapping.photo_grid import CELLS, cells_of, occupied, widened
+from sfm_front.mapping.view_graph import ViewGraph
+from sfm_front.types import Float64Array
+
+_NOWHERE: Float64Array = np.zeros((0, 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,15 +63,17 @@ class FoldOptions:
 
 
 def find_fold(
-    reconstruction: pycolmap.Reconstruction, options: FoldOptions | None = None
+    reconstruction: pycolmap.Reconstruction,
+    view_graph: ViewGraph,
+    options: FoldOptions | None = None,
 ) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
     """Image ids of the two parts of a model that contradict each other most, the larger first.
 
     None if none do so enough to tell.
     """
-    comparison = _Comparison(reconstruction, options or FoldOptions())
+    comparison = _Comparison(reconstruction, view_graph, options or FoldOptions())
     worst, largest = None, 0.0
-    for beyond in halves(comparison.num_shared):
+    for beyond in comparison.sharing.halves():
         conflict = comparison.conflict(beyond)
         if conflict > largest:
             worst, largest = beyond, conflict
@@ -73,17 +83,26 @@ def find_fold(
 class _Comparison:
     """What the photos of a model see of each other's points."""
 
-    def __init__(self, reconstruction: pycolmap.Reconstruction, options: FoldOptions) -> None:
+    def __init__(
+        self,
+        reconstruction: pycolmap.Reconstruction,
+        view_graph: ViewGraph,
+        options: FoldOptions,
+    ) -> None:
+        self._reconstruction = reconstruction
+        self._view_graph = view_graph
         self._options = options
         self.covisibility = Covisibility.of(reconstruction, min_observers=options.min_observers)
-        self.num_shared = self.covisibility.num_shared()
+        self.sharing = self.covisibility.sharing()
+        self._comparable = self.sharing.pairs(options.min_shared)
+        # Of those; nan until it is asked for.
+        self._angles_deg = np.full(len(self._comparable), np.nan)
         images = [reconstruction.image(int(i)) for i in self.covisibility.image_ids]
         self._posed = [
             PosedCamera(reconstruction.camera(image.camera_id), image.cam_from_world())
             for image in images
         ]
         self._centers = np.array([posed.center for posed in self._posed])
-        self._angles_deg: dict[tuple[int, int], float] = {}
         self._bounds: dict[tuple[int, int], IndexArray] = {}
 
     def conflict(self, beyond: BoolArray) -> float:
@@ -107,31 +126,28 @@ class _Comparison:
 
     def _pairs(self, beyond: BoolArray) -> list[tuple[int, int]]:
         """The pairs to compare, the first photo of each ``beyond``."""
-        inside, outside = np.flatnonzero(beyond), np.flatnonzero(~beyond)
-        shared = self.num_shared[np.ix_(inside, outside)]
-        rows, columns = np.nonzero(shared >= self._options.min_shared)
-        order = np.argsort(-shared[rows, columns], kind="stable")
+        first, second = self._comparable.T
+        angles, most = self._angles_deg, self._options.max_angle_deg
+        crossing = np.flatnonzero((beyond[first] != beyond[second]) & ~(angles > most))
         chosen: list[tuple[int, int]] = []
-        for row, column in zip(rows[order], columns[order], strict=True):
-            pair = int(inside[row]), int(outside[column])
-            if self._angle_deg(pair) <= self._options.max_angle_deg:
-                chosen.append(pair)
+        for row in crossing.tolist():
+            one, other = self._comparable[row].tolist()
+            if np.isnan(angles[row]):
+                angles[row] = self._angle_deg((one, other))
+            if angles[row] <= most:
+                chosen.append((one, other) if beyond[one] else (other, one))
                 if len(chosen) == self._options.max_pairs:
                     break
         return chosen
 
     def _angle_deg(self, pair: tuple[int, int]) -> float:
         """Median angle between the directions in which two photos see the points they share."""
-        key = min(pair), max(pair)
-        if key not in self._angles_deg:
-            first, second = (self.covisibility.observed[photo] for photo in key)
-            points = self.covisibility.points[np.intersect1d(first, second, assume_unique=True)]
-            rays1, rays2 = (points - self._centers[photo] for photo in key)
-            cosine = np.einsum("nd,nd->n", rays1, rays2)
-            cosine /= np.linalg.norm(rays1, axis=1) * np.linalg.norm(rays2, axis=1)
-            angle = float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
-            self._angles_deg[key] = angle
-        return self._angles_deg[key]
+        first, second = (self.covisibility.observed[photo] for photo in pair)
+        points = self.covisibility.points[np.intersect1d(first, second, assume_unique=True)]
+        rays1, rays2 = (points - self._centers[photo] for photo in pair)
+        cosine = np.einsum("nd,nd->n", rays1, rays2)
+        cosine /= np.linalg.norm(rays1, axis=1) * np.linalg.norm(rays2, axis=1)
+        return float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
 
     def _bound(self, pair: tuple[int, int]) -> IndexArray:
         """At least as many cells in which things are missing, and no more that are the same, than
@@ -152,18 +168,43 @@ class _Comparison:
         first, second = (self.covisibility.observed[photo] for photo in pair)
         unique = first[~seen_by_others[first]], second[~seen_by_own[second]]
         shared = np.union1d(first[seen_by_others[first]], second[seen_by_own[second]])
-        return self._cells(pair, unique, shared)
+        return self._cells(pair, unique, shared, (self._found(pair), self._found(pair[::-1])))
+
+    def _found(self, pair: tuple[int, int]) -> Float64Array:
+        """(K, 2) pixels of the first photo that matches link to points of the second, and that lie
+        within a cell of these."""
+        first, second = (
+            self._reconstruction.image(int(self.covisibility.image_ids[photo])) for photo in pair
+        )
+        pixels, points = [], []
+        for ours, theirs in self._view_graph.matches(first.image_id, second.image_id).tolist():
+            seen = second.point2D(theirs)
+            if seen.has_point3D():
+                pixels.append(first.point2D(ours).xy)
+                points.append(self._reconstruction.point3D(seen.point3D_id).xyz)
+        found = np.array(pixels, np.float64).reshape(-1, 2)
+        posed = self._posed[pair[0]]
+        off = posed.project(np.array(points, np.float64).reshape(-1, 3)) - found
+        cell = max(posed.camera.width, posed.camera.height) / CELLS
+        # False for nan: points behind the camera.
+        near: Float64Array = found[np.abs(off).max(axis=1, initial=0) <= cell]
+        return near
 
     def _cells(
-        self, pair: tuple[int, int], unique: tuple[IndexArray, IndexArray], shared: IndexArray
+        self,
+        pair: tuple[int, int],
+        unique: tuple[IndexArray, IndexArray],
+        shared: IndexArray,
+        found: tuple[Float64Array, Float64Array] = (_NOWHERE, _NOWHERE),
     ) -> IndexArray:
         """(2, 2) cells in which the first photo and the second miss unique points of the other,
-        with no shared ones near; and cells with shared points."""
+        with no shared ones near; and cells with shared points. ``found``: pixels of either photo
+        that count as shared points too."""
         counts = []
-        for photo, theirs in zip(pair, unique[::-1], strict=True):
+        for photo, theirs, also in zip(pair, unique[::-1], found, strict=True):
             posed = self._posed[photo]
             pixels = posed.project(self.covisibility.points[np.concatenate([theirs, shared])])
-            cells = cells_of(pixels, posed.camera)
+            cells = cells_of(np.concatenate([pixels, also]), posed.camera)
             missing, same = occupied(cells[: len(theirs)]), occupied(cells[len(theirs) :])
             missing &= ~widened(same)
             counts.append((np.count_nonzero(missing), np.count_nonzero(same)))

@@ -13,6 +13,7 @@ from sfm_front.mapping.calibration import CalibrationOptions
 from sfm_front.mapping.local_refinement import LocalRefinementOptions
 from sfm_front.mapping.position_priors import PriorOptions
 from sfm_front.mapping.refinement_schedule import ScheduleOptions
+from sfm_front.mapping.thinned_adjustment import HUGE
 
 # Trials are limited here, by the points a photo sees, not by pycolmap.
 _UNLIMITED_TRIALS = 1_000_000
@@ -64,10 +65,11 @@ class ConvergenceOptions:
     global_tolerance: float = 1e-4
     global_iterations: int = 15
     global_refinements: int = 2
-    # Global ones of a complete model, and of a large one. COLMAP's own tolerance is 0. 1e-6 gives
-    # the same model; with 1e-5 a long flight stays bent (TUNING: final-tolerance).
+    # Global ones of a complete model, and of a large one. COLMAP's own tolerance is 0. With 1e-5 a
+    # long flight stays bent (TUNING: final-tolerance), with 1e-6 more or less so, by the order of
+    # its photos (TUNING: large-tolerances).
     final_tolerance: float = 1e-5
-    large_final_tolerance: float = 1e-6
+    large_final_tolerance: float = 1e-7
     # That from which the robust adjustment of a model that is not large goes on, at the end.
     last_tolerance: float = 3e-5
     # Share of the observations from which that refinement goes on to another round.
@@ -91,6 +93,10 @@ class MapperOptions:
     # A global adjustment moves the cameras by those points alone that add this much to what others
     # cover of a photo, and the others afterwards (TUNING: coverage-gain).
     min_coverage_gain: float = 0.1
+    # The same of a model from that many photos on: fewer points place them as well, and memory and
+    # time go with the points (TUNING: thinned).
+    huge_coverage_gain: float = 0.5
+    huge_from: int = HUGE
     # Of the bundle adjustment.
     num_threads: int = 2
     # Of all RANSAC.
@@ -107,10 +113,9 @@ class MapperOptions:
     def __post_init__(self) -> None:
         if self.retry_growth < 1:
             raise ConfigError(f"retry_growth must be at least 1, got {self.retry_growth}")
-        if self.min_coverage_gain < 0:
-            raise ConfigError(
-                f"min_coverage_gain must not be negative, got {self.min_coverage_gain}"
-            )
+        for name in ("min_coverage_gain", "huge_coverage_gain", "huge_from"):
+            if getattr(self, name) < 0:
+                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}")
         if self.num_threads < 1:
             raise ConfigError(f"num_threads must be at least 1, got {self.num_threads}")
         robust = replace(
@@ -120,6 +125,10 @@ class MapperOptions:
             large_from=self.schedule.large_from,
         )
         object.__setattr__(self, "robust", robust)
+
+    def coverage_gain(self, num_photos: int) -> float:
+        """What a point must add to move the cameras of a model of so many photos."""
+        return self.huge_coverage_gain if num_photos >= self.huge_from else self.min_coverage_gain
 
     def final(self, num_photos: int) -> pycolmap.IncrementalPipelineOptions:
         """pycolmap's options for a complete model of ``num_photos``."""
@@ -134,7 +143,7 @@ class MapperOptions:
         options.ba_refine_extra_params = self.refine_intrinsics
         options.mapper.max_reg_trials = _UNLIMITED_TRIALS
         options.mapper.ba_global_ignore_redundant_points3D = True
-        options.mapper.ba_global_prune_points_min_coverage_gain = self.min_coverage_gain
+        options.mapper.ba_global_prune_points_min_coverage_gain = self.coverage_gain(num_photos)
         options.mapper.abs_pose_refine_focal_length = self.refine_intrinsics
         options.mapper.abs_pose_refine_extra_params = self.refine_intrinsics
         return options

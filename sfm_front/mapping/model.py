@@ -61,7 +61,7 @@ class Model:
         self._streaming = options.streaming()
         self._mapping = self._streaming.get_mapper()
         self._triangulation = self._streaming.get_triangulation()
-        self._local = LocalRefinement(self._streaming, options.local_refinement)
+        self._local = LocalRefinement(self._streaming, options.local_refinement, view_graph.part)
         self._schedule = RefinementSchedule(options.schedule)
         self._seen_at_failure: dict[int, int] = {}
         self._mapper, self.reconstruction = view_graph.new_mapper(reconstruction)
@@ -382,6 +382,8 @@ class Model:
         self._beside.leave()
         started, centers = time.perf_counter(), camera_centers(self.reconstruction)
         self._begin_anew()
+        gain = self._options.coverage_gain(self.num_registered)
+        self._mapping.ba_global_prune_points_min_coverage_gain = gain
         self._mapper.iterative_global_refinement(
             pipeline.ba_global_max_refinements,
             pipeline.ba_global_max_refinement_change,

@@ -9,7 +9,7 @@ import numpy as np
 import pycolmap
 
 from sfm_front.mapping.covisibility import IndexArray
-from sfm_front.types import Float32Array, Float64Array
+from sfm_front.types import Float64Array
 
 _MAX_PHOTOS = 50
 _MAX_POINTS = 1500
@@ -53,7 +53,7 @@ class ObservationSample:
         )
         photo, point, keypoint = _observations(reconstruction, images, looked_at)
         if len(images) > _MAX_PHOTOS:
-            kept = np.isin(photo, _close_photos(photo, point, len(images), len(looked_at)))
+            kept = np.isin(photo, close_photos(photo, point, len(images), len(looked_at)))
             photo, point, keypoint = photo[kept], point[kept], keypoint[kept]
         observers = np.bincount(point, minlength=len(looked_at))
         chosen, part = _chosen(np.flatnonzero(observers >= _MIN_OBSERVERS), _MAX_POINTS, rng)
@@ -90,30 +90,40 @@ def _observations(
 ) -> tuple[IndexArray, IndexArray, IndexArray]:
     """Photo, point and keypoint of each observation; photos and points by their place."""
     place = {image.image_id: number for number, image in enumerate(images)}
-    found = [
-        (number, index, element.point2D_idx)
+    # There are millions in a long flight: never a Python object for each at once.
+    found = (
+        number
         for index, point_id in enumerate(point_ids.tolist())
         for element in reconstruction.point3D(point_id).track.elements
-        if (number := place.get(element.image_id)) is not None
-    ]
-    photo, point, keypoint = np.array(found, np.int64).reshape(-1, 3).T
+        if (place_of := place.get(element.image_id)) is not None
+        for number in (place_of, index, element.point2D_idx)
+    )
+    photo, point, keypoint = np.fromiter(found, np.int64).reshape(-1, 3).T
     return photo, point, keypoint
 
 
-def _close_photos(
+def close_photos(
     photo: IndexArray, point: IndexArray, num_photos: int, num_points: int
 ) -> list[int]:
-    """Places of the photo that sees most points and of those that share most with what is there."""
-    sees: Float32Array = np.zeros((num_photos, num_points), np.float32)
-    sees[photo, point] = 1
-    common = np.ones(num_points, np.float32)
+    """The photo that sees most points and, up to 50 in all, those that share most with what is
+    there, in that order.
+
+    ``photo`` (K,) and ``point`` (K,): numbers below ``num_photos`` and ``num_points``, of each
+    observation.
+    """
+    # Of a long flight, a matrix of all photos and points would take gigabytes.
+    photo, point = np.divmod(np.unique(photo * num_points + point), num_points)
+    ends = np.searchsorted(photo, np.arange(num_photos + 1))
+    is_common = np.ones(num_points, np.bool_)
     chosen: list[int] = []
     while len(chosen) < _MAX_PHOTOS:
-        shared = sees @ common
+        shared = np.bincount(photo[is_common[point]], minlength=num_photos)
         shared[chosen] = -1
         best = int(np.argmax(shared))
         if shared[best] <= 0:
             break
-        common = sees[best].copy() if not chosen else np.maximum(common, sees[best])
+        if not chosen:
+            is_common[:] = False
+        is_common[point[ends[best] : ends[best + 1]]] = True
         chosen.append(best)
     return chosen

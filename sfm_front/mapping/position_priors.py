@@ -15,6 +15,7 @@ from sfm_front.mapping.bundle_adjustment import (
     median_error,
     robust_adjustment,
 )
+from sfm_front.mapping.thinned_adjustment import adjust_thinned
 from sfm_front.types import Float64Array
 
 # COLMAP falls back to a fixed gauge with fewer, and does not say so.
@@ -69,17 +70,20 @@ def held_to_positions(
     if len(rows) < _MIN_PRIORS:
         return None
     held = copy.deepcopy(reconstruction)
-    config = pycolmap.BundleAdjustmentConfig()
-    for image_id in held.reg_image_ids():
-        config.add_image(image_id)
     weighing = pycolmap.PosePriorBundleAdjustmentOptions()
     weighing.alignment_ransac.random_seed = 0
     weighing.ceres.prior_position_loss_function_type = pycolmap.LossFunctionType.CAUCHY
     weighing.ceres.prior_position_loss_scale = options.loss_scale
-    # It moves the model when it is made, and back when it has solved.
-    pycolmap.create_pose_prior_bundle_adjuster(
-        robust_adjustment(adjustment, held.num_reg_images()), weighing, config, rows, held
-    ).solve()
+    robust = robust_adjustment(adjustment, held.num_reg_images())
+
+    def hold(model: pycolmap.Reconstruction) -> None:
+        config = pycolmap.BundleAdjustmentConfig()
+        for image_id in model.reg_image_ids():
+            config.add_image(image_id)
+        # It moves the model when it is made, and back when it has solved.
+        pycolmap.create_pose_prior_bundle_adjuster(robust, weighing, config, rows, model).solve()
+
+    adjust_thinned(held, robust, hold)
     held.update_point_3d_errors()
     limit = (1 + options.max_error_rise) * median_error(reconstruction)
     return held if median_error(held) <= limit else None

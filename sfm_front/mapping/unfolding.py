@@ -30,7 +30,7 @@ def unfold(atlas: Atlas) -> bool:
 def _take_apart(atlas: Atlas, model: Model) -> bool:
     """Part a model in two if it is folded."""
     graph, evidence = atlas.view_graph, Evidence.SURROUNDINGS
-    parts = find_fold(model.reconstruction, atlas.options.fold)
+    parts = find_fold(model.reconstruction, graph, atlas.options.fold)
     if parts is None:
         parts, evidence = misplaced(model.reconstruction, graph), Evidence.MATCHES
     if parts is None:

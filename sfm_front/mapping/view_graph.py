@@ -187,6 +187,36 @@ class ViewGraph:
         """What photos see of a model that no mapper can go on with: its lenses may be others."""
         return pycolmap.ObservationManager(reconstruction, self._cache.correspondence_graph)
 
+    def part(
+        self,
+        reconstruction: pycolmap.Reconstruction,
+        image_ids: Collection[int],
+        point_ids: Collection[int],
+    ) -> pycolmap.Reconstruction:
+        """A model of some registered photos, all points that they see, these other points, and the
+        photos that see any of them: copies, under the ids that they have in the model."""
+        points = {
+            point.point3D_id
+            for image_id in image_ids
+            for point in reconstruction.image(image_id).get_observation_points2D()
+        }.union(point_ids)
+        seen = {point_id: reconstruction.point3D(point_id) for point_id in points}
+        observers = {e.image_id for point in seen.values() for e in point.track.elements}
+        part = pycolmap.Reconstruction()
+        for image_id in sorted(observers.union(image_ids)):
+            image = self._cache.image(image_id)
+            if not part.exists_camera(image.camera_id):
+                part.add_camera(reconstruction.camera(image.camera_id))
+                part.add_rig(self._cache.rig(image.camera_id))
+            part.add_frame(self._cache.frame(image.frame_id))
+            part.add_image(image)
+            pose = reconstruction.image(image_id).cam_from_world()
+            part.frame(image.frame_id).rig_from_world = pose
+            part.register_frame(image.frame_id)
+        for point_id, point in seen.items():
+            part.add_point3D_with_id(point_id, point)
+        return part
+
     def extend(
         self,
         mapper: pycolmap.IncrementalMapper,

@@ -20,7 +20,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``georeferenced`` | how far positions say where a model stands on the earth |
 | ``held_to_control_points`` | the finished model, with its ``origin`` and how well it fits |
 | ``control_points_refused`` | why they cannot be used; the model is left as it is |
-| ``finishing_began`` | a ``step`` of the session's end begins, once no more photos come |
+| ``finishing_began`` | no more photos come: a ``step`` of the end begins; ``turn``: for a model |
 | ``session_ended`` | ``finished``: whether all models are written |
 
 New fields and events leave the version as it is; readers pass over what they do not know.

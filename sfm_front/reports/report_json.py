@@ -21,7 +21,7 @@ from sfm_front.reports.run_summary import (
     Totals,
 )
 from sfm_front.storage.json_files import write_json
-from sfm_front.types import Skipped, SkipReason
+from sfm_front.types import Skipped, SkipReason, WaitingReason
 
 FILE = "report.json"
 
@@ -105,6 +105,7 @@ def _row(photo: Outcome) -> dict[str, Any]:
         "registered": photo.model is not None,
         "model": photo.model,
         "why_not_registered": photo.why_not,
+        "waiting": photo.waiting and photo.waiting.value,
         "what_would_help": photo.hint,
         "keypoints": photo.num_keypoints,
         "most_relevant": photo.most_relevant,
@@ -233,4 +234,6 @@ def _outcome(row: dict[str, Any]) -> Outcome:
         seconds=row["seconds"],
         events=tuple(row["events"]),
         hint=row.get("what_would_help", ""),  # absent in reports of earlier versions
+        # The same, and of photos in a model.
+        waiting=WaitingReason(row["waiting"]) if row.get("waiting") else None,
     )

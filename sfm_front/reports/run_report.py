@@ -31,7 +31,7 @@ from sfm_front.reports.run_summary import (
     RunSummary,
     Totals,
 )
-from sfm_front.types import ModelSummary, Skipped, StoredPhoto
+from sfm_front.types import ModelSummary, Skipped, StoredPhoto, Waiting
 
 
 class RunReport:
@@ -68,7 +68,7 @@ class RunReport:
     def finish(
         self,
         models: Sequence[ModelSummary],
-        why_not: Mapping[int, str],
+        why_not: Mapping[int, Waiting],
         hints: Mapping[int, str],
         *,
         audits: Sequence[ModelAudit],
@@ -167,16 +167,18 @@ def _audit_outcome(audit: ModelAudit, reconstruction: pycolmap.Reconstruction) -
 def _outcome(
     photo: Skipped | PhotoAdded,
     model_of: Mapping[int, int],
-    why_not: Mapping[int, str],
+    why_not: Mapping[int, Waiting],
     hints: Mapping[int, str],
 ) -> Outcome:
     if isinstance(photo, Skipped):
         return photo
+    why = why_not.get(photo.image_id)
     return PhotoOutcome(
         name=photo.name,
         image_id=photo.image_id,
         model=model_of.get(photo.image_id),
-        why_not=why_not.get(photo.image_id),
+        why_not=None if why is None else str(why),
+        waiting=None if why is None else why.reason,
         num_keypoints=photo.num_keypoints,
         most_relevant=photo.most_relevant,
         num_verified=len(photo.verified),

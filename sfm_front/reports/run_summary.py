@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from sfm_front.reports.camera_outcome import CameraOutcome
 from sfm_front.reports.cluster_outcome import ClusterOutcome
-from sfm_front.types import Skipped
+from sfm_front.types import Skipped, WaitingReason
 
 if TYPE_CHECKING:  # The command line reads this before anything heavy may be loaded.
     from sfm_front.georeference.control.report import ControlReport
@@ -22,7 +22,8 @@ class PhotoOutcome:
     """What became of a photo that was used.
 
     ``model``: number of the largest model that holds it; if None, ``why_not`` says why, and
-    ``hint`` what would help.
+    ``hint`` what would help. ``waiting``: of what kind that reason is; None in reports of earlier
+    versions, and where it is of no kind.
     ``num_verified`` and ``num_rejected`` count its pairs with earlier photos. ``placed`` names the
     photos that were registered when it arrived. ``seconds`` is by stage; ``events`` are in words.
     """
@@ -39,6 +40,7 @@ class PhotoOutcome:
     seconds: dict[str, float]
     events: tuple[str, ...]
     hint: str = ""
+    waiting: WaitingReason | None = None
 
 
 @dataclass(frozen=True, slots=True)

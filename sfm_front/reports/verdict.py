@@ -112,9 +112,10 @@ def _missing(summary: RunSummary) -> str:
 
 
 def _cause(photo: PhotoOutcome) -> str:
+    if photo.waiting is not None:
+        return _CAUSES[photo.waiting]
     why = photo.why_not or ""
-    known = (words for reason, words in _CAUSES.items() if why.startswith(reason.value))
-    return next(known, "of this: " + why.replace("{", "{{").replace("}", "}}"))
+    return "of this: " + why.replace("{", "{{").replace("}", "}}")
 
 
 def _are_poor(missing: list[PhotoOutcome], summary: RunSummary) -> bool:

@@ -11,6 +11,7 @@ retrieval", ICCV 2007.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -33,6 +34,9 @@ class IndexOptions:
     # Photos of nearest codes whose vectors are compared; four times those requested if that is
     # more. More take longer and hardly find more (TUNING: shortlist).
     shortlist: int = 192
+    # So many times the square root of the photos, if that is more still: among more photos, more
+    # have codes as near as those of the nearest (TUNING: shortlist-growth).
+    shortlist_growth: float = 14.0
     # Photos that an expanded query re-orders; twice those requested if that is more. The whole
     # shortlist takes longer and gives the same (TUNING: expansion-depth).
     expansion_depth: int = 100
@@ -41,6 +45,13 @@ class IndexOptions:
         for name in ("shortlist", "expansion_depth"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if not 0 <= self.shortlist_growth < math.inf:
+            raise ConfigError(f"shortlist_growth must not be negative, got {self.shortlist_growth}")
+
+    def num_compared(self, num_photos: int, count: int) -> int:
+        """Photos whose vectors a query for the nearest ``count`` of ``num_photos`` compares."""
+        growing = math.ceil(self.shortlist_growth * math.sqrt(num_photos))
+        return min(num_photos, max(self.shortlist, 4 * count, growing))
 
 
 class CosineIndex:
@@ -98,7 +109,7 @@ class CosineIndex:
         cosine; ``expand_with``: photos added likewise. The expanded vector orders the best
         ``IndexOptions.expansion_depth``; reported cosines remain those with the original vector.
         """
-        rows = self._shortlist(vector, max(self._options.shortlist, 4 * count))
+        rows = self._shortlist(vector, self._options.num_compared(len(self), count))
         cosines = scores = self._cosines(vector, rows)
         best = (int(rows[i]) for i in _best(cosines, num_expansion))
         companions = {*best, *(self._rows[image_id] for image_id in expand_with)}

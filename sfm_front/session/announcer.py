@@ -12,18 +12,23 @@ from sfm_front.events import (
     FinishingStep,
     Listener,
     ModelEvent,
+    ModelTurn,
     PhotoArrived,
     PhotoPlaced,
     PhotoWaiting,
 )
 from sfm_front.mapping.atlas import Atlas
+from sfm_front.session.options import SessionOptions
 from sfm_front.types import PhotoPath
 
 
 class Announcer:
     """Hands each event to all listeners at once."""
 
-    def __init__(self, listeners: Sequence[Listener]) -> None:
+    def __init__(self, listeners: Sequence[Listener], options: SessionOptions) -> None:
+        self._steps = list(FinishingStep)
+        if options.control_points.file is None:
+            self._steps.remove(FinishingStep.CONTROL_POINTS)
         self._listeners = list(listeners)
         self._model_events: list[ModelEvent] = []
         self._paths: dict[str, Path] = {}
@@ -39,9 +44,9 @@ class Announcer:
         for listener in self._listeners:
             listener(event)
 
-    def begin(self, step: FinishingStep) -> None:
-        """A step of the session's end begins."""
-        self.tell(FinishingBegan(step))
+    def begin(self, step: FinishingStep, turn: ModelTurn | None = None) -> None:
+        """A step of the session's end begins, or in it the turn of a model."""
+        self.tell(FinishingBegan(step, self._steps.index(step) + 1, len(self._steps), turn))
 
     def tell_of_model(self, event: ModelEvent) -> None:
         """An event of a model; it is kept for ``pop_model_events``, too."""
@@ -70,7 +75,7 @@ class Announcer:
             self.tell_placed(atlas, placed_id)
         if image_id not in placed:
             name, why = atlas.view_graph.name(image_id), atlas.why_not_registered(image_id)
-            self.tell(PhotoWaiting(name, image_id, why))
+            self.tell(PhotoWaiting(name, image_id, str(why), why.reason))
 
     def tell_placed(self, atlas: Atlas, image_id: int) -> None:
         """A photo that is registered now and was not before."""

@@ -49,6 +49,10 @@ class PhotoCatalog(Mapping[int, View]):
         self._cameras.remember(photo, camera)
         self._enter(photo.image_id, photo.name, camera, colors)
 
+    def forget_features(self) -> None:
+        """Hold none in memory: nothing is matched any more, and adjusting needs room."""
+        self._features.clear()
+
     def name(self, image_id: int) -> str:
         """What the photo is called in the models."""
         return self._names[image_id]
@@ -95,6 +99,12 @@ class FeatureMemory:
             while self._num_bytes > self._max_bytes and len(self._kept) > 1:
                 _, dropped = self._kept.popitem(last=False)
                 self._num_bytes -= _num_bytes(dropped)
+
+    def clear(self) -> None:
+        """Let go of all."""
+        with self._lock:
+            self._kept.clear()
+            self._num_bytes = 0
 
     def __getitem__(self, image_id: int) -> Features:
         with self._lock:

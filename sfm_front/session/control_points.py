@@ -23,6 +23,7 @@ from sfm_front.georeference.control.point_file import ControlPoint, read_control
 from sfm_front.georeference.control.report import ControlReport
 from sfm_front.georeference.control.surveyed import frame_at
 from sfm_front.mapping.model import Model
+from sfm_front.mapping.position_priors import PositionPriors
 from sfm_front.session.georeferencing import Georeferencing
 
 # Between control points and the photos that positions have put somewhere: further apart, one of
@@ -85,11 +86,13 @@ class ControlPoints:
         frame = georeferencing.frame_of(models) or frame_at(self._points)
         why_not = ""
         for number, model in enumerate(models):
-            result = self._held(model, marks, frame)
+            result = self._held(model, marks, frame, georeferencing.priors_of(model))
             if isinstance(result, NotControlled):
                 why_not = why_not or result.reason  # that of the largest
                 continue
             reason = f"held to {result.control.count} control points"
+            if result.num_positions:
+                reason += f" and {result.num_positions} positions of photos"
             georeferencing.held_to_control(model, frame, result.enu_from_model, reason)
             told = result.checkpoints if result.checkpoints.count else result.control
             self._emit(
@@ -115,7 +118,11 @@ class ControlPoints:
         return replace(report, not_used=why_not or "There is no model.")
 
     def _held(
-        self, model: Model, marks: Sequence[PhotoMark], frame: LocalFrame
+        self,
+        model: Model,
+        marks: Sequence[PhotoMark],
+        frame: LocalFrame,
+        positions: PositionPriors | None,
     ) -> ControlResult | NotControlled:
         """The model moves only if they can hold it."""
         adjusted = copy.deepcopy(model.reconstruction)
@@ -134,6 +141,7 @@ class ControlPoints:
             self._options,
             model.robust,
             is_metric=is_metric,
+            positions=positions,
         )
         if isinstance(result, ControlResult):
             model.adopt(adjusted)

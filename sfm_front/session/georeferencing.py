@@ -18,6 +18,7 @@ from sfm_front.georeference.georeferencer import Georeference, Georeferencer, Ph
 from sfm_front.georeference.sidecar import Sidecar, sidecar_of
 from sfm_front.georeference.spread import GeoreferenceState
 from sfm_front.mapping.model import Model
+from sfm_front.mapping.position_priors import PositionPriors
 from sfm_front.reports.run_summary import GeoreferenceOutcome
 from sfm_front.session.photo_positions import PhotoPositions
 
@@ -57,6 +58,15 @@ class Georeferencing:
         """The one in which positions have put some of them; None if they have put none there."""
         is_fixed = any(model.is_georeferenced for model in models)
         return self._georeferencer.frame if is_fixed else None
+
+    def priors_of(self, model: Model) -> PositionPriors | None:
+        """The positions to which a finished model is held; None if it is not, as where they
+        contradict its photos."""
+        if not (model.is_georeferenced and model.is_held_to_positions):
+            return None
+        measured = self._positions.measured(self._positions.checked().usable)
+        found = self._georeferencer.look_at(self._poses(model), measured)
+        return found.priors if found.state is GeoreferenceState.METRIC else None
 
     def held_to_control(
         self, model: Model, frame: LocalFrame, enu_from_model: pycolmap.Sim3d, reason: str

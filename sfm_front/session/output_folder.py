@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sfm_front.errors import InputError
-from sfm_front.exporters.colmap import STATE
 from sfm_front.georeference.sidecar import FILE_NAME as SIDECAR
 from sfm_front.reports import event_log, html, report_json, retrieval_log
 from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.database import DATABASE
 from sfm_front.storage.session_lock import SessionLock
+from sfm_front.storage.written_models import STATE
 
 _MARKER = retrieval_log.FILE
 _FILES = (
@@ -26,6 +26,8 @@ _FILES = (
     html.SCENE_FILE,
     _MARKER,
 )
+# Of what else lies in the folder.
+_MOST_NAMED = 3
 _MODELS = ("sparse", "sparse.new", "sparse.old")
 WORKING_FOLDER = "cluster"
 """What workers of a cluster have made, until it is in the output itself."""
@@ -96,6 +98,21 @@ def open_output_folder(output: Path, *, overwrite: bool, resume: bool = False) -
         lock.close()
         raise _unwritable(output, error) from error
     return lock
+
+
+def told_of_others(output: Path) -> str:
+    """A line if a new session is going to write into a folder with other things; else empty.
+
+    It is not refused: in COLMAP's projects, photos lie beside the database. Nothing is overwritten.
+    """
+    if not output.is_dir() or _is_there(output / _MARKER):
+        return ""
+    others = sorted(path.name for path in output.iterdir() if not path.name.startswith("."))
+    if not others:
+        return ""
+    named = ", ".join(others[:_MOST_NAMED])
+    more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
+    return f"{output}: is not empty; {named}{more} will stay as they are, beside the output"
 
 
 def holds_session(output: Path) -> bool:

@@ -20,7 +20,6 @@ from sfm_front.events import (
 )
 from sfm_front.features.global_descriptors.descriptor import resolve
 from sfm_front.georeference.georeferencer import Georeference
-from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.mapping.audit import audit
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.unfolding import unfold
@@ -43,7 +42,7 @@ from sfm_front.session.parts import open_parts, restore
 from sfm_front.session.photo_account import photo_added
 from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.resume import as_dict, check_options, mark_finished, mark_running
-from sfm_front.session.snapshots import Snapshots, read_snapshot
+from sfm_front.session.snapshots import MakeSidecar, Snapshots, read_snapshot
 from sfm_front.session.summing_up import SessionResult, sum_up
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import (
@@ -111,7 +110,7 @@ class Session(Closeable):
             device=device,
         )
         positions = PhotoPositions(self.options.positions)
-        self._announcer = Announcer([] if on_event is None else [on_event])
+        self._announcer = Announcer([] if on_event is None else [on_event], self.options)
         control_points = ControlPoints(self.options.control_points, self._announcer.tell_of_model)
         self.messages = tuple(line for line in (on_device, on_descriptor) if line)
         self._finished = False
@@ -246,6 +245,7 @@ class Session(Closeable):
             self._placing_more(self._parts.second_look.at_end)
             self._write_snapshot_if_due()  # It may have placed many, and adjusting takes long.
         with clock.stage("finish"):
+            self._parts.catalog.forget_features()
             self._placing_more(
                 lambda: finish(
                     self._parts.atlas,
@@ -269,7 +269,7 @@ class Session(Closeable):
             positions = self._parts.georeferencing.outcome(
                 self._parts.atlas.models, self._parts.control_points.report
             )
-            models = self._export(positions.sidecar if positions else None, final=True)
+            models = self._export(lambda: positions.sidecar if positions else None, final=True)
         summary = sum_up(
             self._parts,
             self.options,
@@ -321,9 +321,9 @@ class Session(Closeable):
             self._write_snapshot()
 
     def _write_snapshot(self) -> None:
-        self._export(self._parts.georeferencing.sidecar(self._parts.atlas.models))
+        self._export(lambda: self._parts.georeferencing.sidecar(self._parts.atlas.models))
 
-    def _export(self, sidecar: Sidecar | None, *, final: bool = False) -> list[ModelSummary]:
+    def _export(self, sidecar: MakeSidecar, *, final: bool = False) -> list[ModelSummary]:
         catalog = self._parts.catalog
         return self._snapshots.write(
             self._parts.atlas.models,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,7 @@ import pycolmap
 
 from sfm_front.errors import InputError, StorageError
 from sfm_front.exporters.colmap import (
-    STATE,
     color_points,
-    damaged_file,
     export_models,
     recover_models,
 )
@@ -25,13 +23,19 @@ from sfm_front.mapping.model import Model
 from sfm_front.mapping.model_state import ModelState
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.storage.watched_mark import is_watched
+from sfm_front.storage.written_models import STATE, damaged_file
 from sfm_front.types import ModelSummary, Uint8Array
 
 logger = logging.getLogger(__name__)
 
+MakeSidecar = Callable[[], "Sidecar | None"]
+"""Makes what stands in ``georeference.json``."""
+
 _VERSION = 1
 # A snapshot of a large model takes long: at most this share of the time goes into them.
 _MAX_SHARE = 0.05
+# But none waits longer for the one before: that may have taken so long because the machine slept.
+_MAX_WAIT_S = 600.0
 # The first one comes after so many seconds, the next ones after this share of the session's age: of
 # what was mapped when a young session is killed, at most a quarter is mapped again.
 _FIRST_S = 1.0
@@ -72,7 +76,8 @@ class Snapshots:
         watched_s = max(_WATCHED_S, self._spent / _WATCHED_SHARE)
         if watched_s < wanted_s and is_watched(self._folder.parent):
             wanted_s = watched_s
-        return now - self._last >= max(min(self._interval_s, wanted_s), self._spent / _MAX_SHARE)
+        rest_s = min(self._spent / _MAX_SHARE, _MAX_WAIT_S)
+        return now - self._last >= max(min(self._interval_s, wanted_s), rest_s)
 
     def write(
         self,
@@ -80,14 +85,15 @@ class Snapshots:
         num_photos: int,
         colors: Mapping[int, Uint8Array],
         georeferencing: Mapping[str, Any],
-        sidecar: Sidecar | None,
+        sidecar: MakeSidecar,
         *,
         final: bool = False,
         text: bool = False,
     ) -> list[ModelSummary]:
         """Write all models, whole or not at all; ``final`` ones with their point clouds.
 
-        ``georeferencing``: as ``Georeferencing.as_json`` gives it.
+        ``georeferencing``: as ``Georeferencing.as_json`` gives it. ``sidecar`` makes what stands in
+        ``georeference.json``: of many photos this takes its time, too.
 
         Raises StorageError if the disk is full, or the output was removed.
         """
@@ -113,7 +119,7 @@ class Snapshots:
                 "models": [asdict(model.state) for model in models],
                 "georeferencing": georeferencing,
             },
-            sidecar=sidecar,
+            sidecar=sidecar(),
         )
         self._last = time.monotonic()
         self._spent = self._last - started

@@ -120,8 +120,8 @@ def read_pair(
         None if blob is None else np.frombuffer(blob, np.float64).reshape(3, 3) for blob in row[5:8]
     )
     if row[8] is not None:
-        quaternion = np.roll(np.frombuffer(row[8], np.float64), -1)
-        rotation = pycolmap.Rotation3d(quaternion)
+        w, x, y, z = np.frombuffer(row[8], np.float64)
+        rotation = pycolmap.Rotation3d(np.array((x, y, z, w)))
         geometry.cam2_from_cam1 = pycolmap.Rigid3d(rotation, np.frombuffer(row[9], np.float64))
     if image_id1 > image_id2:
         geometry.invert()

@@ -14,6 +14,7 @@ from sfm_front.events import (
     FinishingBegan,
     FinishingStep,
     ModelRefined,
+    ModelTurn,
     PhotoAdded,
 )
 from sfm_front.types import Skipped, SkipReason
@@ -129,6 +130,35 @@ def test_what_can_be_mended_while_photos_come_is_told_then_and_else_in_the_summa
     line.show(ControlPointsRefused("line 8 is wrong."))
     first, _ = stream.getvalue().splitlines()
     assert first == "control points cannot be used: line 7 is wrong."
+
+
+def adjusted(model_id: int, num_photos: int, number: int = 1, num_models: int = 1):
+    turn = ModelTurn(model_id, number, num_models, num_photos)
+    return FinishingBegan(FinishingStep.LAST_ADJUSTMENT, 4, 6, turn)
+
+
+def test_the_end_is_told_by_steps_and_models():
+    stream = io.StringIO()
+    line = ProgressLine(stream)
+    line.show(FinishingBegan(FinishingStep.REFINE, 2, 6))
+    line.show(adjusted(3, 40, 2, 3))
+    assert stream.getvalue().splitlines() == [
+        "finishing 2 of 6: refining the models",
+        "finishing 4 of 6: last adjustment of all cameras and points (model 2 of 3, 40 photos)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("refined_s", "said"),
+    [(0.1, ""), (10.0, ", usually 0:40 to 2:40"), (2.5, ", usually up to 0:40")],
+)
+def test_how_long_the_last_adjustment_takes_is_told_by_the_refinement_before(refined_s, said):
+    stream = io.StringIO()
+    line = ProgressLine(stream)
+    line.show(ModelRefined(1, 500, 9000, seconds=refined_s))
+    line.show(ModelRefined(2, 500, 9000, seconds=77.0))  # Of another model.
+    line.show(adjusted(1, 1000))
+    assert stream.getvalue().splitlines()[-1].partition("(1000 photos)")[2] == said
 
 
 def test_counting_without_a_terminal_takes_a_line_each_tenth(turn):

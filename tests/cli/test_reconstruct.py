@@ -157,10 +157,12 @@ def test_the_summary_closes_the_output(run):
 
 
 def test_the_steps_of_the_end_are_told_as_they_begin(run):
-    steps = re.findall(r"^finishing: (.*)$", run.stdout, re.M)
-    assert steps == [
-        *(step.value for step in FinishingStep if step is not FinishingStep.CONTROL_POINTS),
-        "drawing the page",
+    steps = [step.value for step in FinishingStep if step is not FinishingStep.CONTROL_POINTS]
+    steps[3] += f" ({run.report['models'][0]['registered']} photos)"
+    told = re.findall(r"^finishing.*$", run.stdout, re.M)
+    assert told == [
+        *(f"finishing {number} of 6: {step}" for number, step in enumerate(steps, start=1)),
+        "finishing: drawing the page",
     ]
 
 
@@ -222,6 +224,15 @@ def test_overwrite_replaces_what_a_session_wrote_and_nothing_else(five, tmp_path
     assert not (output / "sparse" / "7").exists()
     with pycolmap.Database.open(output / "database.db") as database:
         assert database.num_images() == 2
+
+
+def test_a_folder_with_other_files_is_told_of_before_it_is_written_to(five, tmp_path, capsys):
+    output = tmp_path / "project"
+    (output / "notes").mkdir(parents=True)
+    for _ in range(2):
+        reconstruct(five, output, "--max-features", "50")
+    told = capsys.readouterr().out
+    assert told.count("project: is not empty; notes will stay as they are") == 1
 
 
 def test_random_order_is_the_seeds(five, tmp_path):

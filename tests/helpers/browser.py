@@ -46,9 +46,16 @@ def chromium() -> Iterator[Any]:
 class Tab:
     """A tab with a profile of its own; ``complaints``: errors that it told of."""
 
-    def __init__(self, browser: Any, address: str, size: tuple[int, int] = (1000, 500)) -> None:
+    def __init__(
+        self,
+        browser: Any,
+        address: str,
+        size: tuple[int, int] = (1000, 500),
+        scheme: str = "dark",
+    ) -> None:
+        """``scheme``: what its user prefers, light or dark."""
         viewport = {"width": size[0], "height": size[1]}
-        self.page = browser.new_context(viewport=viewport).new_page()
+        self.page = browser.new_context(viewport=viewport, color_scheme=scheme).new_page()
         self.complaints: list[str] = []
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on(

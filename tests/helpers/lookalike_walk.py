@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pycolmap
 
@@ -12,7 +14,10 @@ from sfm_front.types import PairGeometry
 NUM_PHOTOS = 19
 _STEP, _APART, _DISTANCE = 0.5, 6.0, 4.0
 _NUM_ALIKE, _NUM_BESIDE, _NUM_BETWEEN = 200, 60, 60
+_SHIFTS = (0.0, _APART, -_APART)
 MIN_MATCHES = 15
+# Of the points that two ends of a way see which have drifted apart, one in so many is one point.
+_ONE_IN = 6
 
 
 class LookAlikeWalk:
@@ -58,13 +63,20 @@ class LookAlikeWalk:
         ids = np.flatnonzero(((pixels > 0) & (pixels < (WIDTH, HEIGHT))).all(axis=1))
         return ids, pixels[ids]
 
-    def pair(self, first: int, second: int, image_ids: tuple[int, int]) -> PairGeometry | None:
-        """What verification makes of two photos: the largest set of matches that fit one pose."""
+    def pair(
+        self,
+        first: int,
+        second: int,
+        image_ids: tuple[int, int],
+        shifts: Sequence[float] = _SHIFTS,
+    ) -> PairGeometry | None:
+        """What verification makes of two photos: the largest set of matches that fit one pose,
+        by which things have moved sideways by one of ``shifts``."""
         ids1, ids2 = self.ids[first], self.ids[second]
         rows, columns = np.nonzero(self.looks[ids1][:, None] == self.looks[ids2][None, :])
         shift = self.points[ids2[columns]] - self.points[ids1[rows]]
         best = None
-        for sideways in (0.0, _APART, -_APART):
+        for sideways in shifts:
             fits = np.abs(shift[:, 0] - sideways) < 1e-9
             if best is None or fits.sum() > best[0].sum():
                 best = fits, sideways
@@ -85,26 +97,29 @@ class LookAlikeWalk:
         )
         return PairGeometry(*image_ids, matches, geometry)
 
-    def view_graph(self) -> ViewGraph:
-        """All photos, image ids counted from 1, with all their pairs."""
+    def view_graph(self, *, true_pairs: bool = False) -> ViewGraph:
+        """All photos, image ids counted from 1, with all pairs; or as if nothing were alike."""
+        shifts = (0.0,) if true_pairs else _SHIFTS
         graph = ViewGraph()
         for index in range(NUM_PHOTOS):
             keypoints = np.zeros((len(self.ids[index]), 4), np.float32)
             keypoints[:, :2] = self.pixels[index]
-            found = [self.pair(index, j, (index + 1, j + 1)) for j in range(index)]
+            found = [self.pair(index, j, (index + 1, j + 1), shifts) for j in range(index)]
             pairs = [pair for pair in found if pair is not None]
             graph.add(index + 1, f"{index:02d}.jpg", self.camera, keypoints, pairs)
         return graph
 
-    def model(self, *, folded: bool) -> pycolmap.Reconstruction:
+    def model(self, *, folded: bool = False, drift: float = 0.0) -> pycolmap.Reconstruction:
         """The true model; or the one in which the two things are one, and the last photos, which
-        see the second, stand before the first."""
+        see the second, stand before the first. With ``drift`` the last photos stand, and see what
+        they see, so far below where it is; only a few points are those that the others see too."""
         model = pycolmap.Reconstruction()
         model.add_camera_with_trivial_rig(self.camera)
-        back = pycolmap.Rigid3d(pycolmap.Rotation3d(), self.offset)
+        moved = self.offset if folded else np.array([0.0, 0.0, drift])
+        back = pycolmap.Rigid3d(pycolmap.Rotation3d(), moved)
         tracks: dict[tuple[bool, int], pycolmap.Track] = {}
         for index, pose in enumerate(self.poses):
-            late = folded and 2 * index >= NUM_PHOTOS
+            late = moved.any() and 2 * index >= NUM_PHOTOS
             image = pycolmap.Image(
                 name=f"{index:02d}.jpg",
                 keypoints=self.pixels[index],
@@ -113,11 +128,14 @@ class LookAlikeWalk:
             )
             model.add_image_with_trivial_frame(image, pose * back if late else pose)
             for keypoint, point in enumerate(self.ids[index].tolist()):
-                # In the folded model each half has its own copy of what stands between.
-                name = (False, point - _NUM_ALIKE) if late and _is_second(point) else (late, point)
+                # Each half has its own copy of what stands between; of a few things if it drifted.
+                if folded and late and _is_second(point):
+                    name = False, point - _NUM_ALIKE
+                else:
+                    name = late and (folded or point % _ONE_IN > 0), point
                 tracks.setdefault(name, pycolmap.Track()).add_element(index + 1, keypoint)
         for (late, point), track in tracks.items():
-            place = self.points[point] - (self.offset if late else 0)
+            place = self.points[point] - (moved if late else 0)
             if track.length() >= 2:
                 model.add_point3D(place, track, np.zeros(3, np.uint8))
         return model

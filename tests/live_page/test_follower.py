@@ -14,7 +14,7 @@ from helpers.positioned_stream import options
 
 from sfm_front.exporters.colmap import export_models
 from sfm_front.live_page.follower import OutputFollower
-from sfm_front.live_page.story import PhotoState
+from sfm_front.reports.story import PhotoState
 from sfm_front.session.session import Session
 
 NUM_PHOTOS = 12

@@ -162,6 +162,39 @@ def test_a_hostile_name_does_no_harm(tab, served):
     assert tab.page.locator("img[src='x']").count() == 0
 
 
+def test_a_click_on_a_row_opens_its_photo_here_alone(browser, served, tab):
+    other = Tab(browser, served.page.address)
+    for name in ("000006.jpg", HOSTILE, "000006.jpg"):
+        show(tab, "Photos")
+        row = tab.page.locator("[data-photo]", has_text=visible(name))
+        tab.wait_for(lambda row=row: row.count() == 1)
+        row.click()
+        tab.wait_for(lambda name=name: visible(name) in chosen(tab))
+    assert "000006.jpg" not in chosen(other)
+    other.close()
+    # What carries the click is not to be seen.
+    assert not tab.page.locator("input[value='-1']").is_visible()
+
+
+def brightness(tab: Tab) -> float:
+    return float(np.median(tab.picture()[:, 700:]))
+
+
+def test_colours_are_those_that_a_browser_prefers_or_its_user_chooses(browser, served, tab):
+    light = Tab(browser, served.page.address, scheme="light")
+    light.wait_for(lambda: "finished" in light.text)
+    light.wait_for(lambda: brightness(light) > 200)
+    assert brightness(tab) < 60
+    light.page.emulate_media(color_scheme="dark")  # As in the evening.
+    light.wait_for(lambda: brightness(light) < 60)
+    show(light, "View")
+    light.page.get_by_role("button", name="light").click()
+    light.wait_for(lambda: brightness(light) > 200)
+    assert brightness(tab) < 60
+    light.close()
+    assert light.complaints == []
+
+
 def test_it_does_not_complain(tab):
     assert tab.complaints == []
 

@@ -14,7 +14,7 @@ from sfm_front.live_page.model_shapes import ModelShape
 from sfm_front.live_page.palette import NEWEST, WEAK, linear, of_model
 from sfm_front.live_page.scene_view import view_of
 from sfm_front.live_page.scenery import SceneMaker
-from sfm_front.live_page.story import PhotoState, PhotoStory, Story
+from sfm_front.reports.story import PhotoState, PhotoStory, Story
 
 
 def shape(count: int = 12, *, scale: float = 1.0, turn=None, **changes: object) -> ModelShape:

@@ -9,10 +9,10 @@ import pytest
 from helpers.live_session import HOSTILE
 
 from sfm_front.live_page import photo_words, words
-from sfm_front.live_page.event_words import in_words
 from sfm_front.live_page.follower import Outcome, Seen
-from sfm_front.live_page.story import PhotoState, PhotoStory, Story
+from sfm_front.reports.event_words import in_words
 from sfm_front.reports.lights import Level
+from sfm_front.reports.story import PhotoState, PhotoStory, Story
 from sfm_front.reports.verdict import Verdict
 
 
@@ -83,6 +83,13 @@ def test_the_headline_counts():
 )
 def test_the_headline_says_how_it_stands(ended, now, expected):
     assert expected in " ".join(text_of(words.headline(seen(ended=ended), now)).split())
+
+
+def test_the_headline_names_the_step_of_the_end():
+    what = seen()
+    what.story.step = "finishing 4 of 6: last adjustment"
+    text = " ".join(text_of(words.headline(what, 1400.0)).split())
+    assert "finishing 4 of 6: last adjustment for 5:10" in text
 
 
 @pytest.mark.parametrize("level", [Level.GOOD, Level.FAIR, Level.BAD])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pycolmap
 import pytest
 from helpers.photo_stream import SceneFeed
@@ -20,9 +21,13 @@ OPTIONS = MapperOptions(num_threads=1).streaming()
 Refine = Callable[[pycolmap.IncrementalMapper, int], None]
 
 
-def grown(refine: Refine) -> pycolmap.Reconstruction:
+def orbit() -> SceneFeed:
+    return SceneFeed(make_scene(14, 500, seed=3, layout="orbit", noise_px=0.5))
+
+
+def grown(refine: Refine, feed: SceneFeed | None = None) -> pycolmap.Reconstruction:
     """A model of an orbit after two photos and then one more at a time, each refined around."""
-    feed = SceneFeed(make_scene(14, 500, seed=3, layout="orbit", noise_px=0.5))
+    feed = feed or orbit()
     feed.add_all(range(NUM_PHOTOS))
     mapper, model = feed.scene.new_mapper()
     mapping, triangulation = OPTIONS.get_mapper(), OPTIONS.get_triangulation()
@@ -80,6 +85,31 @@ def test_photos_of_a_large_model_share_an_adjustment(monkeypatch):
     )
 
 
+def test_apart_from_a_huge_model_it_is_the_same_to_the_bit(monkeypatch):
+    # Not all photos are in a bundle: some stand fixed.
+    monkeypatch.setattr(OPTIONS.mapper, "ba_local_num_images", 3)
+    whole = grown(LocalRefinement(OPTIONS).add)
+    monkeypatch.setattr(LocalRefinementOptions, "is_apart", lambda *_: True)
+    feed, parts = orbit(), []
+
+    def part(*given: object) -> pycolmap.Reconstruction:
+        parts.append(feed.scene.part(*given))
+        return parts[-1]
+
+    apart = grown(LocalRefinement(OPTIONS, part=part).add, feed)
+    assert len(parts) == NUM_PHOTOS - 2
+    assert any(one.num_points3D() < apart.num_points3D() for one in parts)
+    for image_id in whole.reg_image_ids():
+        np.testing.assert_array_equal(
+            apart.image(image_id).cam_from_world().matrix(),
+            whole.image(image_id).cam_from_world().matrix(),
+        )
+    assert sorted(apart.point3D_ids()) == sorted(whole.point3D_ids())
+    for point_id in whole.point3D_ids():
+        np.testing.assert_array_equal(apart.point3D(point_id).xyz, whole.point3D(point_id).xyz)
+    np.testing.assert_array_equal(apart.camera(1).params, whole.camera(1).params)
+
+
 def test_what_was_refined_with_the_whole_model_is_forgotten(monkeypatch):
     monkeypatch.setattr(LocalRefinementOptions, "batch_size", lambda *_: 2)
     ours = LocalRefinement(OPTIONS)
@@ -100,7 +130,10 @@ def test_the_larger_a_model_the_more_photos_share_an_adjustment():
     assert {batch_size(size) for size in range(2, 250)} == {1}
     assert batch_size(250) == 2
     # Each checks the whole model: for a photo, that stays below the check of 250 photos.
-    assert all(size / batch_size(size) <= 250 for size in range(2, 10_000, 7))
+    assert all(size / batch_size(size) <= 250 for size in range(2, 1000))
+    # From there on it is refined apart, and the batch is as large as it may be.
+    assert {batch_size(size) for size in range(1000, 10_000, 7)} == {4}
+    assert [LocalRefinementOptions().is_apart(size) for size in (999, 1000)] == [False, True]
 
 
 def test_points_in_more_photos_than_the_limit_stay_fixed():
@@ -111,7 +144,7 @@ def test_points_in_more_photos_than_the_limit_stay_fixed():
         assert LocalRefinement(OPTIONS, options)._is_short(point) is moves
 
 
-@pytest.mark.parametrize("name", ["photos_per_batch", "max_track_length"])
+@pytest.mark.parametrize("name", ["photos_per_batch", "max_batch", "max_track_length"])
 def test_numbers_below_one_are_refused(name):
     with pytest.raises(ConfigError, match=f"{name} must be at least 1, got 0"):
         LocalRefinementOptions(**{name: 0})

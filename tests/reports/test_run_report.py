@@ -31,6 +31,8 @@ from sfm_front.types import (
     Rejection,
     Skipped,
     SkipReason,
+    Waiting,
+    WaitingReason,
 )
 
 POSE = looking([0, 0, 0], [0, 1, 0], [0, 0, 1])
@@ -89,7 +91,7 @@ def run(tmp_path) -> RunSummary:
         summary(tmp_path, 0, ["ä 1.jpg", "b.jpg"], error_px=0.5, points=300),
         summary(tmp_path, 1, ["ä 1.jpg"], error_px=1.5, points=100),
     ]
-    why_not = {3: "no verified matches"}
+    why_not = {3: Waiting(WaitingReason.NO_POSE, 7)}
     return report.finish(
         models,
         why_not,
@@ -130,7 +132,8 @@ def test_a_row_a_photo_in_their_order(content):
     assert second["events"] == [str(STARTED)]  # the seconds tell of refinements
     assert (third["registered"], third["model"]) == (False, None)
     assert (third["verified_pairs"], third["rejected_pairs"]) == (0, 1)
-    assert third["why_not_registered"] == "no verified matches"
+    assert third["why_not_registered"] == "no pose fits the 7 model points it sees"
+    assert third["waiting"] == "no pose fits the model points it sees"
     assert third["what_would_help"] == "take one between them"
     assert first["why_not_registered"] is None
 

@@ -13,16 +13,19 @@ from sfm_front.reports.camera_outcome import CameraOutcome
 from sfm_front.reports.lights import Level
 from sfm_front.reports.run_summary import RunSummary
 from sfm_front.reports.verdict import verdict
-from sfm_front.types import SkipReason, WaitingReason
+from sfm_front.types import SkipReason, Waiting, WaitingReason
 
 SOUND = replace(METRIC, residuals=replace(METRIC.residuals, outliers=()))
 
 
-def waiting_for(*reasons: str, of: int = 9) -> RunSummary:
+def waiting_for(*reasons: Waiting | str, of: int = 9) -> RunSummary:
     """A run of which so many photos found no place, for these reasons."""
     summary = summary_of(Output(num_photos=of, num_waiting=len(reasons)))
     placed, missing = summary.used[: of - len(reasons)], summary.used[of - len(reasons) :]
-    missing = [replace(p, why_not=why) for p, why in zip(missing, reasons, strict=True)]
+    missing = [
+        replace(p, why_not=str(why), waiting=why.reason if isinstance(why, Waiting) else None)
+        for p, why in zip(missing, reasons, strict=True)
+    ]
     return replace(summary, photos=(*placed, *missing))
 
 
@@ -59,9 +62,9 @@ def test_the_sentence_says_what_came_out_and_why_it_is_no_more(output, sidecar, 
 
 
 def test_the_likely_cause_is_that_of_most_photos():
-    no_pose = f"{WaitingReason.NO_POSE.value} the 12 model points it sees"
-    other = no_pose.replace("12", "9")
-    alone = WaitingReason.NO_MATCHES.value
+    no_pose = Waiting(WaitingReason.NO_POSE, 12)
+    other = Waiting(WaitingReason.NO_POSE, 9)
+    alone = Waiting(WaitingReason.NO_MATCHES)
     assert verdict(waiting_for(no_pose, other), None).sentence == (
         "7 of 9 photos are in one model; 2 found no place, "
         "because they share too little with the photos in the model."
@@ -75,7 +78,7 @@ def test_the_likely_cause_is_that_of_most_photos():
 
 
 def test_photos_without_details_may_be_blurred():
-    summary = waiting_for(WaitingReason.NO_MATCHES.value, WaitingReason.NO_MATCHES.value)
+    summary = waiting_for(*[Waiting(WaitingReason.NO_MATCHES)] * 2)
     photos = [
         photo if photo.model is not None else replace(photo, num_keypoints=40)
         for photo in summary.used

@@ -19,7 +19,7 @@ def random_vectors(count: int, dimension: int = DIMENSION) -> np.ndarray:
     return unit_length(rng.normal(size=(count, dimension)).astype(np.float32))
 
 
-def index_of(vectors: np.ndarray, **options: int) -> CosineIndex:
+def index_of(vectors: np.ndarray, **options: float) -> CosineIndex:
     index = CosineIndex(vectors.shape[1], IndexOptions(**options))
     for image_id, vector in enumerate(vectors):
         index.add(image_id, vector)
@@ -155,11 +155,38 @@ def test_a_longer_shortlist_finds_more_of_the_nearest():
     vectors = random_vectors(4 * SHORTLIST)
     nearest = np.argsort(-(vectors @ vectors[5]))[:10]
     exhaustive, brief = (
-        {c.image_id for c in index_of(vectors, shortlist=shortlist).query(vectors[5], 10)}
+        {
+            c.image_id
+            for c in index_of(vectors, shortlist=shortlist, shortlist_growth=0).query(
+                vectors[5], 10
+            )
+        }
         for shortlist in (len(vectors), 1)
     )
     assert exhaustive == set(nearest)
     assert not exhaustive <= brief
+
+
+@pytest.mark.parametrize(
+    ("num_photos", "compared"), [(100, 100), (200, 198), (10_000, 1400), (1_000_000, 14_000)]
+)
+def test_more_photos_have_more_of_them_compared(num_photos, compared):
+    assert IndexOptions().num_compared(num_photos, 25) == compared
+
+
+def test_the_nearest_are_found_among_many_that_are_as_near_as_each_other():
+    """What most have in common hides how they differ: only a longer shortlist finds those."""
+    common = np.full(DIMENSION, 0.8 / np.sqrt(DIMENSION))
+    vectors = unit_length((common + random_vectors(16 * SHORTLIST)).astype(np.float32))
+    queries = unit_length((common + random_vectors(20)).astype(np.float32))
+    recalls = []
+    for growth in (0.0, IndexOptions().shortlist_growth):
+        index = index_of(vectors, shortlist_growth=growth)
+        found = [{c.image_id for c in index.query(query, 25)} for query in queries]
+        nearest = np.argsort(-(queries @ vectors.T), axis=1)[:, :25]
+        recalls.append(np.mean([len(f & set(n)) / 25 for f, n in zip(found, nearest, strict=True)]))
+    assert recalls[0] < recalls[1]
+    assert recalls[1] > 0.97
 
 
 @pytest.mark.parametrize(("depth", "reordered"), [(1, 20), (30, 30)])
@@ -178,3 +205,9 @@ def test_an_expanded_query_orders_just_the_nearest(depth, reordered):
 def test_values_out_of_range_are_refused_by_name(name):
     with pytest.raises(ConfigError, match=f"{name} must be at least 1, got 0"):
         IndexOptions(**{name: 0})
+
+
+@pytest.mark.parametrize("growth", [-1.0, float("nan"), float("inf")])
+def test_a_shortlist_does_not_shrink(growth):
+    with pytest.raises(ConfigError, match="shortlist_growth must not be negative"):
+        IndexOptions(shortlist_growth=growth)

@@ -101,7 +101,9 @@ def test_it_hands_its_options_to_the_index():
     found = []
     for shortlist in (len(vectors), 1):
         options = RetrievalOptions(
-            candidates=10, num_expansion=0, index=IndexOptions(shortlist=shortlist)
+            candidates=10,
+            num_expansion=0,
+            index=IndexOptions(shortlist=shortlist, shortlist_growth=0),
         )
         retriever = Retriever(options, 64)
         for image_id, vector in enumerate(vectors):

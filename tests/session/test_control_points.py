@@ -186,6 +186,7 @@ def test_points_win_over_positions_whose_frame_stays(tmp_path, photos, rows, str
     assert sidecar.origin == origin
     assert sidecar.models_in_enu == (0,)
     assert np.abs(camera_errors_m(result, strip, origin)).max() < CAMERA_M
+    assert sidecar.reasons == (f"held to 6 control points and {NUM_PHOTOS} positions of photos",)
     # Positions are told as they are: off, in the mean.
     residuals = sidecar.residuals
     means = [residuals.east.mean, residuals.north.mean, residuals.up.mean]

@@ -27,7 +27,7 @@ TUNED = {
         "contrast_threshold": 0.05,
         "small_photo_contrast_threshold": 0.01,
     },
-    "retrieval.index": {"shortlist": 256, "expansion_depth": 120},
+    "retrieval.index": {"shortlist": 256, "shortlist_growth": 9.0, "expansion_depth": 120},
     "rerank": {"batch_size": 6, "good_inliers": 40},
     "second_rerank": {"batch_size": 7, "good_inliers": 50},
     "matching.rotation": {

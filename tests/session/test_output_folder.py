@@ -11,7 +11,11 @@ import pytest
 from helpers.locations import ROOT
 
 from sfm_front.errors import InputError
-from sfm_front.session.output_folder import check_output_folder, open_output_folder
+from sfm_front.session.output_folder import (
+    check_output_folder,
+    open_output_folder,
+    told_of_others,
+)
 from sfm_front.storage.atomic import write_atomically
 
 
@@ -51,6 +55,22 @@ def test_overwriting_removes_a_finished_output_and_nothing_beside_it(tmp_path):
     opened_and_closed(output, overwrite=True)
     left = {path for path in output.rglob("*") if path.is_file()}
     assert left == {*kept, output / "retrieval.jsonl"}  # the marker of the session that follows
+
+
+def test_what_else_lies_in_a_folder_is_told_and_stays(tmp_path):
+    assert told_of_others(tmp_path / "new") == told_of_others(tmp_path) == ""
+    (tmp_path / ".DS_Store").touch()
+    assert told_of_others(tmp_path) == ""
+    put(tmp_path / "images" / "a.jpg")
+    assert told_of_others(tmp_path).startswith(f"{tmp_path}: is not empty; images will stay")
+    for name in ("b.txt", "c.txt", "d.txt", "e.txt"):
+        put(tmp_path / name)
+    told = told_of_others(tmp_path)
+    assert "b.txt, c.txt, d.txt and 2 more will stay" in told
+    before = contents(tmp_path)
+    opened_and_closed(tmp_path, overwrite=False)
+    assert before.items() <= contents(tmp_path).items()
+    assert told_of_others(tmp_path) == ""  # It is an output now.
 
 
 def test_an_output_is_not_overwritten_unasked(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pycolmap
@@ -73,3 +74,23 @@ def test_what_the_last_look_has_placed_is_written_before_the_last_adjustment(
         steps.index(FinishingStep.LAST_ADJUSTMENT),
     )
     assert looked < steps.index("snapshot") < adjusted < steps.index("final")
+
+
+def test_after_one_that_took_very_long_the_next_does_not_wait_for_ever(tmp_path, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(snapshots.time, "monotonic", lambda: now[0])
+    (tmp_path / "out").mkdir()
+    kept = snapshots.Snapshots(tmp_path / "out" / "sparse", 30.0)
+    assert not kept.is_due
+    now[0] = 100.0
+    assert kept.is_due
+
+    def sidecar(took_s: float) -> None:
+        now[0] += took_s
+
+    for took_s, waits_s in ((1.0, 30.0), (10.0, 200.0), (3600.0, 600.0)):
+        kept.write([], 0, {}, {}, partial(sidecar, took_s))
+        now[0] += waits_s - 1
+        assert not kept.is_due
+        now[0] += 2
+        assert kept.is_due

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sfm_front.errors import InputError
-from sfm_front.runtime.subprocess_env import module_environment
+from sfm_front.runtime.subprocess_env import module_command, module_environment
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ColmapView:
 def colmap_view(database: Path, sparse: Path) -> ColmapView:
     """Have a process of its own read both; either may be missing."""
     done = subprocess.run(
-        [sys.executable, "-m", __name__, str(database), str(sparse)],
+        module_command(__name__, str(database), str(sparse)),
         env=module_environment(),
         capture_output=True,
         text=True,

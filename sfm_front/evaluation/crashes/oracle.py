@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from sfm_front.evaluation.crashes.colmap_view import ColmapView, colmap_view
-from sfm_front.exporters.colmap import STATE, damaged_file
 from sfm_front.reports.event_log import FILE as EVENTS
 from sfm_front.storage.database import DATABASE
+from sfm_front.storage.written_models import STATE, damaged_file
 
 _OURS = {"sfm_front_session", "sfm_front_photos", "sfm_front_skipped", "sfm_front_pairs"}
 # COLMAP's id of a pair is id1 * _PAIR + id2, of the lower id and the higher one.

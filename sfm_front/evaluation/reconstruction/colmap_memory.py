@@ -11,13 +11,13 @@ import zlib  # noqa: F401  Before pycolmap, which exports one of its own.
 from pathlib import Path
 
 from sfm_front.evaluation.process import resident_bytes
-from sfm_front.runtime.subprocess_env import module_environment
+from sfm_front.runtime.subprocess_env import module_command, module_environment
 
 
 def colmap_memory_bytes(output: Path) -> int | None:
     """Have a process of its own load both, as a session holds them; None without /proc."""
     done = subprocess.run(
-        [sys.executable, "-m", __name__, str(output)],
+        module_command(__name__, str(output)),
         env=module_environment(),
         stdout=subprocess.PIPE,
         text=True,

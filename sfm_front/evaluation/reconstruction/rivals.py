@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import asdict
 from pathlib import Path
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.process import measure
 from sfm_front.evaluation.reconstruction.types import BenchmarkSettings, Run
+from sfm_front.runtime.subprocess_env import module_command
 from sfm_front.storage.colmap_models import find_models
 
 #: How each chooses the pairs it matches.
@@ -45,13 +45,9 @@ def run_rival(name: str, photos: Path, workspace: Path, settings: BenchmarkSetti
             }
         )
     )
-    command = [
-        sys.executable,
-        "-m",
-        "sfm_front.evaluation.reconstruction.rival_process",
-        str(task),
-        str(result),
-    ]
+    command = module_command(
+        "sfm_front.evaluation.reconstruction.rival_process", str(task), str(result)
+    )
     measured = measure(command, workspace / "log.txt")
     if measured.return_code or not result.is_file():
         return Run(

@@ -14,6 +14,7 @@ from time import perf_counter
 from sfm_front.errors import SfmFrontError
 from sfm_front.evaluation.process import measure
 from sfm_front.evaluation.reconstruction.types import BenchmarkSettings
+from sfm_front.runtime.subprocess_env import module_command
 
 
 def sift_alone_seconds(photos: Path, workspace: Path, settings: BenchmarkSettings) -> float:
@@ -33,13 +34,9 @@ def sift_alone_seconds(photos: Path, workspace: Path, settings: BenchmarkSetting
             }
         )
     )
-    command = [
-        sys.executable,
-        "-m",
-        "sfm_front.evaluation.reconstruction.sift_alone",
-        str(task),
-        str(result),
-    ]
+    command = module_command(
+        "sfm_front.evaluation.reconstruction.sift_alone", str(task), str(result)
+    )
     measured = measure(command, workspace / "log.txt")
     if measured.return_code:
         raise SfmFrontError(f"OpenCV's SIFT failed on {photos}: {measured.last_line}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,7 @@ class PhotoCost:
     """The cost of one photo from retrieval to mapping: wall seconds without and with global
     refinement, and CPU seconds with refinement, which other work on the machine hardly affects.
     ``memory_bytes``: the process's memory afterwards; None on systems without /proc.
+    ``retrieval_seconds``: of the wall seconds, those of the query of the index.
     """
 
     seconds: float
@@ -40,6 +42,13 @@ class PhotoCost:
     processor_seconds: float
     memory_bytes: int | None
     num_registered: int
+    retrieval_seconds: float = 0.0
+
+    @property
+    def refinement_processor_seconds(self) -> float:
+        """CPU seconds of global refinement: its share of the wall seconds."""
+        refinement = self.seconds_with_refinement - self.seconds
+        return self.processor_seconds * refinement / self.seconds_with_refinement
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +76,9 @@ class Memory:
 class StreamResult:
     """``finish_seconds``: the end of the session, export included. ``auc``: of the pose errors of
     all pairs, at 1, 3 and 5 degrees, in [0, 1]. ``bend_share``: how far the largest model is bent
-    up or down at the end, as a share of the extent; None for a small one."""
+    up or down at the end, as a share of the extent; None for a small one.
+    ``finish_processor_seconds`` and ``beside_processor_seconds``: CPU seconds of the end, and of
+    the process that refines models beside a session of several threads."""
 
     photos: tuple[PhotoCost, ...]
     finish_seconds: float
@@ -75,6 +86,8 @@ class StreamResult:
     num_registered: int
     auc: tuple[float, ...]
     bend_share: float | None = None
+    finish_processor_seconds: float = 0.0
+    beside_processor_seconds: float = 0.0
 
     def growth(self, early: slice, late: slice) -> Growth:
         """Mean over the late photos divided by mean over the early ones, for each figure."""
@@ -96,15 +109,17 @@ class StreamResult:
         Refinements are rare, and rarer as the model grows: which hundred photos one falls into is
         chance. Photos after the last one get its share too.
         """
-        seconds = np.array([photo.seconds for photo in self.photos])
-        refinement = np.array([photo.seconds_with_refinement for photo in self.photos]) - seconds
-        spread = np.zeros(len(seconds))
-        start = 0
-        for end in (np.flatnonzero(refinement > 0) + 1).tolist():
-            spread[start:] = refinement[end - 1] / (end - start)
-            start = end
-        amortized: Float64Array = seconds + spread
-        return amortized
+        return _amortized(
+            np.array([photo.seconds_with_refinement for photo in self.photos]),
+            np.array([photo.seconds_with_refinement - photo.seconds for photo in self.photos]),
+        )
+
+    def amortized_processor_seconds(self) -> Float64Array:
+        """(N,) the same in CPU seconds."""
+        return _amortized(
+            np.array([photo.processor_seconds for photo in self.photos]),
+            np.array([photo.refinement_processor_seconds for photo in self.photos]),
+        )
 
     def exponent(self, start: int) -> float:
         """The exponent of a photo's CPU seconds as a power of its number, from ``start`` on.
@@ -132,6 +147,17 @@ class StreamResult:
         return float(slope)
 
 
+def _amortized(seconds: Float64Array, refinement: Float64Array) -> Float64Array:
+    """(N,) seconds, of which those of ``refinement`` are spread."""
+    spread = np.zeros(len(seconds))
+    start = 0
+    for end in (np.flatnonzero(refinement > 0) + 1).tolist():
+        spread[start:] = refinement[end - 1] / (end - start)
+        start = end
+    amortized: Float64Array = seconds - refinement + spread
+    return amortized
+
+
 def run_stream(
     num_photos: int,
     points_per_image: int,
@@ -155,7 +181,7 @@ def run_stream(
     positions = _positions(scene, gps_noise_m)
     descriptor, _ = resolve(_DESCRIPTOR)
     costs: list[PhotoCost] = []
-    at_start = resident_bytes()
+    at_start, beside = resident_bytes(), _of_ended_processes()
     with Session(output, options) as session:
         for index in range(num_photos):
             seen = scene.photo(index)
@@ -172,12 +198,16 @@ def run_stream(
                     process_time() - processor_started,
                     resident_bytes(),
                     added.num_registered,
+                    added.seconds["retrieve"],
                 )
             )
             note(added)
-        started = perf_counter()
+        started, processor_started = perf_counter(), process_time()
         ended = session.finish()
         finish_seconds = perf_counter() - started
+        finish_processor_seconds = process_time() - processor_started
+    # It ends with the session.
+    beside = _of_ended_processes() - beside
     models = [model.reconstruction for model in ended.models]
     peak = ended.summary.totals.peak_memory_bytes
     return StreamResult(
@@ -187,7 +217,15 @@ def run_stream(
         num_registered=max((int(model.num_reg_images()) for model in models), default=0),
         auc=tuple(auc(pose_errors(scene.truth(), models))),
         bend_share=_bend_share(scene, models),
+        finish_processor_seconds=finish_processor_seconds,
+        beside_processor_seconds=beside,
     )
+
+
+def _of_ended_processes() -> float:
+    """CPU seconds of processes that this one has started and that have ended."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def _positions(scene: SyntheticScene, noise_m: float | None) -> list[GeoPosition | None]:

@@ -1,4 +1,4 @@
-"""What scripts share that try sessions on scenes: quiet libraries, errors in a line, figures."""
+"""What scripts share that try sessions: quiet libraries, errors in a line, figures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ def exit_status(
     parse: Callable[[], argparse.Namespace],
     run: Callable[[argparse.Namespace], None],
 ) -> int:
-    """Run a script called ``name``: 0, or 2 after a line for a mistake in what was given."""
+    """Run a script called ``name``: 0, 2 after a line for a mistake in what was given, 130 after
+    one for Ctrl-C."""
     args = parse()
 
     import pycolmap
@@ -28,6 +29,9 @@ def exit_status(
     except SfmFrontError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted before it was done", file=sys.stderr)
+        return 130
     return 0
 
 

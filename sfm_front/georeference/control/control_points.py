@@ -15,6 +15,7 @@ from sfm_front.georeference.control.alignment import align_to_surveyed
 from sfm_front.georeference.control.marks import PhotoMark
 from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.georeference.control.point_file import MIN_POINTS, ControlPoint
+from sfm_front.georeference.control.positions_beside import PositionsBeside
 from sfm_front.georeference.control.residuals import (
     ControlAccuracy,
     PointResidual,
@@ -25,6 +26,7 @@ from sfm_front.georeference.control.residuals import (
 from sfm_front.georeference.control.surveyed import surveyed_in
 from sfm_front.georeference.control.triangulation import MarkedPlace, Sighting, triangulate
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, median_error
+from sfm_front.mapping.position_priors import PositionPriors
 from sfm_front.types import Float64Array
 
 BoolArray = NDArray[np.bool_]
@@ -44,8 +46,8 @@ class ControlResult:
     """A model that control points hold.
 
     ``enu_from_model``: from the model as it was given, before it was adjusted; ``sigma_factor``: 1,
-    or how much larger than stated the points' errors are; ``error_before_px``
-    and ``error_after_px``: medians of its points' reprojection errors.
+    or how much larger than stated the points' errors are; ``num_positions`` of photos hold it, too;
+    ``error_before_px`` and ``error_after_px``: medians of its points' reprojection errors.
     """
 
     enu_from_model: pycolmap.Sim3d
@@ -53,6 +55,7 @@ class ControlResult:
     control: ControlAccuracy
     checkpoints: ControlAccuracy
     sigma_factor: float
+    num_positions: int
     error_before_px: float
     error_after_px: float
 
@@ -76,6 +79,7 @@ def hold_to_control_points(
     adjustment: RobustAdjustmentOptions,
     *,
     is_metric: bool,
+    positions: PositionPriors | None = None,
 ) -> ControlResult | NotControlled:
     """Move the model into the frame and adjust it with its control points; checkpoints are only
     measured.
@@ -83,8 +87,13 @@ def hold_to_control_points(
     ``is_metric``: it is in the frame already, by the positions of its photos. Heights that the file
     does not give are then taken from it, loosely; else such points are taken to lie in about one
     level. Points that fit neither the others nor the photos are left out.
+
+    ``positions`` of photos in the frame hold the model as well, where no points are; see
+    ``PositionsBeside``.
     """
-    return _Control(reconstruction, points, marks, frame, options, is_metric).hold(adjustment)
+    beside = PositionsBeside(reconstruction, positions)
+    control = _Control(reconstruction, points, marks, frame, options, is_metric, beside)
+    return control.hold(adjustment)
 
 
 class _Control:
@@ -96,8 +105,10 @@ class _Control:
         frame: LocalFrame,
         options: ControlOptions,
         is_metric: bool,
+        beside: PositionsBeside,
     ) -> None:
         self._model = model
+        self._beside = beside
         self._points = points
         self._options = options
         images = {model.image(i).name: model.image(i) for i in model.reg_image_ids()}
@@ -149,6 +160,8 @@ class _Control:
             if fitting.sum() < MIN_POINTS or (fitting == held).all():
                 break
             held = fitting
+        num_positions = self._beside.hold(self._held(held, factor), adjustment, self._pixel_sigma())
+        self._places = self._triangulated()
         residuals = tuple(self._residual(i, bool(held[i])) for i in range(len(self._points)))
         return ControlResult(
             enu_from_model=enu_from_model,
@@ -156,6 +169,7 @@ class _Control:
             control=accuracy_of(residuals, PointRole.CONTROL),
             checkpoints=accuracy_of(residuals, PointRole.CHECKPOINT),
             sigma_factor=factor,
+            num_positions=num_positions,
             error_before_px=before,
             error_after_px=median_error(self._model),
         )

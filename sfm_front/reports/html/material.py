@@ -1,11 +1,10 @@
-"""All that the page is made of, read from an output."""
+"""All that the page is made of."""
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -13,16 +12,10 @@ import pycolmap
 
 from sfm_front.geometry.enu import LocalFrame, lat_lon_alt
 from sfm_front.georeference.flight_figures import FlightFigures
-from sfm_front.georeference.sidecar import FILE_NAME, Sidecar, read_sidecar
-from sfm_front.photos.source import files_by_name
-from sfm_front.reports import event_log
-from sfm_front.reports.html import SCENE_FILE
+from sfm_front.georeference.sidecar import Sidecar
 from sfm_front.reports.html.observations import Observations, observations_of
-from sfm_front.reports.report_json import read_report
 from sfm_front.reports.run_summary import RunSummary
-from sfm_front.storage.colmap_models import read_model
-from sfm_front.storage.database import DATABASE
-from sfm_front.storage.finished_session import FinishedSession, read_finished_session
+from sfm_front.storage.stored_session import StoredSession
 from sfm_front.types import Float64Array
 
 
@@ -34,17 +27,21 @@ class Material:
     ``files``: where photos are, those that were skipped, too, by name. ``has_scene``: whether the
     models to turn lie beside the page. ``began``: day and hour in
     UTC; ``version`` of the program that reconstructed. Both empty where nothing says so.
+    ``so_far``: how far a session is that has not ended, empty of one that has; ``observed``: what
+    its models see, by their numbers, for their files may be replaced.
     """
 
     output: Path
     summary: RunSummary
     models: Sequence[pycolmap.Reconstruction]
-    session: FinishedSession
+    session: StoredSession
     sidecar: Sidecar | None
     files: Mapping[str, Path]
     has_scene: bool = False
     began: str = ""
     version: str = ""
+    so_far: str = ""
+    observed: Mapping[int, Observations] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -58,6 +55,8 @@ class Material:
 
     def observations_in(self, number: int) -> Observations:
         """Of the model of this number."""
+        if number in self.observed:
+            return self.observed[number]
         return observations_of(self.models[number], self.output / self.summary.models[number].path)
 
     @cached_property
@@ -92,39 +91,3 @@ class Material:
             return {}
         positions = self.session.positions
         return dict(zip(positions, frame.to_enu(lat_lon_alt(positions.values())), strict=True))
-
-
-def read_material(output: Path, photos: Path | None = None) -> Material:
-    """``photos``: the folder of the photos, if they are no longer where they were.
-
-    Raises InputError if ``output`` is not that of a finished run, a file of it cannot be read, or
-    there is no such folder.
-    """
-    summary = read_report(output)
-    session = read_finished_session(output / DATABASE)
-    files = {**session.skipped, **{photo.name: photo.path for photo in session.photos}}
-    if photos is not None:
-        files = files_by_name(photos)
-    sidecar = output / "sparse" / FILE_NAME
-    began, version = _beginning(output)
-    return Material(
-        output=output,
-        summary=summary,
-        models=[read_model(output / model.path) for model in summary.models],
-        session=session,
-        sidecar=read_sidecar(sidecar) if sidecar.is_file() else None,
-        files=files,
-        has_scene=(output / SCENE_FILE).is_file(),
-        began=began,
-        version=version,
-    )
-
-
-def _beginning(output: Path) -> tuple[str, str]:
-    """When the session began, and the program's version, as its first event says."""
-    try:
-        with (output / event_log.FILE).open(encoding="utf-8") as lines:
-            first = json.loads(lines.readline())
-        return str(first["time"])[:16].replace("T", " "), str(first["version"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return "", ""

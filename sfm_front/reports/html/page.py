@@ -11,7 +11,8 @@ from sfm_front.reports.html.distributions import reprojection_errors, track_leng
 from sfm_front.reports.html.doubts import doubts
 from sfm_front.reports.html.markup import Html, joined, section, tag
 from sfm_front.reports.html.match_matrix import match_matrix
-from sfm_front.reports.html.material import Material, read_material
+from sfm_front.reports.html.material import Material
+from sfm_front.reports.html.material_reading import read_material
 from sfm_front.reports.html.model_pictures import model_pictures
 from sfm_front.reports.html.overlap import overlap
 from sfm_front.reports.html.photo_table import photo_table
@@ -28,13 +29,15 @@ from sfm_front.storage.atomic import write_atomically
 _STYLE = Path(__file__).with_name("page.css")
 # Nothing is fetched and nothing runs, whatever a photo is called.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+# The page of a session that runs is written anew meanwhile.
+_RELOAD_S = 30
 
 
 def write_page(output: Path, photos: Path | None = None) -> Path:
-    """Write the page of a finished ``output`` into it; returns where.
+    """Write the page of ``output`` into it; returns where. It says so if its session has not ended.
 
     ``photos``: the folder of the photos, if they are no longer where they were. Raises InputError
-    if the output is not that of a finished run, or the page cannot be written.
+    if the output is not that of a session, or the page cannot be written.
     """
     page = as_page(read_material(output, photos))
     file = output / FILE
@@ -64,6 +67,7 @@ def as_page(material: Material) -> str:
         tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", name="color-scheme", content="light dark"),
+        tag("meta", http_equiv="refresh", content=_RELOAD_S) if material.so_far else None,
         tag("title", title),
         tag("style", Html(_STYLE.read_text(encoding="utf-8"))),
     )
@@ -78,7 +82,8 @@ def _first_screen(material: Material, found: list[Light], model: Html | None) ->
         "header",
         tag("p", _origin(material), class_="origin"),
         tag("h1", material.name),
-        tag("p", verdict(material.summary, material.sidecar).sentence, class_="verdict"),
+        tag("p", material.so_far, class_="so-far") if material.so_far else None,
+        tag("p", _sentence(material), class_="verdict"),
         _figures(material),
         tag(
             "div",
@@ -87,6 +92,12 @@ def _first_screen(material: Material, found: list[Light], model: Html | None) ->
             class_="first",
         ),
     )
+
+
+def _sentence(material: Material) -> str:
+    if material.so_far and not material.models:
+        return "There is no model yet."
+    return verdict(material.summary, material.sidecar).sentence
 
 
 def _figures(material: Material) -> Html:

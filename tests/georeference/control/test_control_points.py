@@ -16,6 +16,7 @@ from sfm_front.georeference.control.control_points import (
 from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.georeference.control.residuals import PointRole
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions
+from sfm_front.mapping.position_priors import PositionPriors
 
 # Within this are 90 % of the checkpoints: marks of 0.3 px, points of 5 mm, 2.2 cm a pixel.
 CENTIMETRE_M = 0.015
@@ -38,10 +39,17 @@ def rng():
     return np.random.default_rng(1)
 
 
-def hold(model, points, marks, *, is_metric=False):
+def hold(model, points, marks, *, is_metric=False, positions=None):
     options = RobustAdjustmentOptions(num_threads=1)
     return hold_to_control_points(
-        model, points, marks, FRAME, ControlOptions(), options, is_metric=is_metric
+        model,
+        points,
+        marks,
+        FRAME,
+        ControlOptions(),
+        options,
+        is_metric=is_metric,
+        positions=positions,
     )
 
 
@@ -189,3 +197,68 @@ def test_photos_that_are_not_in_the_model_are_passed_over(flight, rng):
     assert point.role is PointRole.NOT_MEASURED
     assert point.east_m is None
     assert result.control.count == 7
+
+
+# Control points in one corner only, the rest is held by positions: of 3 cm, all off by metres.
+CORNER, CORNER_SIGMA_M = ("gcp0", "gcp5", "0_check"), 0.02
+POSITION_SIGMA_M, OFF_M = 0.03, (1.5, -2.0, 3.0)
+
+
+def positions_of(model, rng, *, spoilt=0.0):
+    """Of each photo, as a receiver has them; ``spoilt`` by metres that grow to the east."""
+    sigmas = np.full(3, POSITION_SIGMA_M)
+    places = {}
+    for image_id in model.reg_image_ids():
+        centre = model.image(image_id).projection_center()
+        bend = spoilt * np.array([0, 0, (centre[0] / 14) ** 2])
+        places[image_id] = centre + OFF_M + bend + rng.normal(0, sigmas)
+    return PositionPriors(places, dict.fromkeys(places, sigmas))
+
+
+def in_corner(points):
+    return [
+        replace(p, is_checkpoint=p.name not in CORNER)
+        for p in points
+        if p.name in CORNER or p.is_checkpoint
+    ]
+
+
+def test_positions_hold_a_model_where_there_are_no_points_and_points_say_where_it_is(
+    flight, bent_model, rng
+):
+    points = in_corner(flight.points(rng, sigma_m=CORNER_SIGMA_M))
+    alone = copy.deepcopy(bent_model)
+    assert hold(alone, points, flight.marks).num_positions == 0
+    both = copy.deepcopy(bent_model)
+    positions = positions_of(flight.model, rng)
+    result = hold(both, points, flight.marks, is_metric=True, positions=positions)
+    assert result.num_positions == len(positions.positions)
+    # The checkpoints' own errors are among theirs.
+    assert rms(both, flight.model)[2] < rms(alone, flight.model)[2] / 2
+    assert rms(both, flight.model).max() < 2 * CORNER_SIGMA_M
+    # The points are not pulled away by positions that are off by metres.
+    for point in result.points:
+        if point.role is PointRole.CONTROL:
+            off = (point.east_m, point.north_m, point.up_m)
+            assert np.abs(off).max() < 3 * CORNER_SIGMA_M
+
+
+def test_positions_that_contradict_the_photos_are_left_out(flight, bent_model, rng):
+    points = in_corner(flight.points(rng, sigma_m=CORNER_SIGMA_M))
+    spoilt = positions_of(flight.model, rng, spoilt=2.0)
+    alone, both = copy.deepcopy(bent_model), copy.deepcopy(bent_model)
+    hold(alone, points, flight.marks, is_metric=True)
+    result = hold(both, points, flight.marks, is_metric=True, positions=spoilt)
+    assert result.num_positions == 0
+    assert np.abs(ground(both, alone)[0] - ground(both, alone)[1]).max() < 1e-9
+
+
+def test_positions_of_photos_that_are_not_in_the_model_are_passed_over(flight, bent_model, rng):
+    positions = positions_of(flight.model, rng)
+    strange = PositionPriors(
+        {image_id + 1000: place for image_id, place in positions.positions.items()},
+        {image_id + 1000: sigmas for image_id, sigmas in positions.sigmas.items()},
+    )
+    model = copy.deepcopy(bent_model)
+    result = hold(model, flight.points(rng), flight.marks, is_metric=True, positions=strange)
+    assert result.num_positions == 0

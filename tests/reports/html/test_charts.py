@@ -16,7 +16,7 @@ from PIL import Image
 from sfm_front.reports.html.charts import Series, histogram, nice_step, nice_ticks, stacked_areas
 from sfm_front.reports.html.distributions import reprojection_errors, track_lengths
 from sfm_front.reports.html.match_matrix import match_matrix
-from sfm_front.reports.html.material import read_material
+from sfm_front.reports.html.material_reading import read_material
 from sfm_front.reports.html.observations import observations_of
 from sfm_front.reports.html.residual_grid import residual_grid
 from sfm_front.reports.html.splatting import reduced, splat

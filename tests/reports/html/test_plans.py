@@ -12,7 +12,8 @@ from helpers.report_making import OFFSET_M, Output, finished_output
 from PIL import Image
 
 from sfm_front.reports.html.ground import ground_of, scale_bar, sheet_around
-from sfm_front.reports.html.material import Material, read_material
+from sfm_front.reports.html.material import Material
+from sfm_front.reports.html.material_reading import read_material
 from sfm_front.reports.html.overlap import overlap
 from sfm_front.reports.html.plan import plan
 

@@ -16,7 +16,7 @@ from sfm_front.reports.camera_outcome import CameraOutcome
 from sfm_front.reports.html.material import Material
 from sfm_front.reports.html.verdict import all_lights
 from sfm_front.reports.lights import Level, focal_length
-from sfm_front.storage.finished_session import FinishedSession
+from sfm_front.storage.stored_session import StoredSession
 
 
 def material_of(*, num_matched: int = 500, **output) -> Material:
@@ -24,7 +24,7 @@ def material_of(*, num_matched: int = 500, **output) -> Material:
     models = [pycolmap.Reconstruction()] * len(summary.models)
     matched = {photo.image_id: num_matched for photo in summary.used}
     sidecar = output.get("sidecar")
-    return Material(Path("out"), summary, models, FinishedSession(num_matched=matched), sidecar, {})
+    return Material(Path("out"), summary, models, StoredSession(num_matched=matched), sidecar, {})
 
 
 def camera(

@@ -11,7 +11,7 @@ from helpers.photo_stream import described, true_pair
 
 from sfm_front.evaluation.synthetic.scene import make_scene
 from sfm_front.storage.database import PhotoDatabase
-from sfm_front.storage.finished_session import read_finished_session
+from sfm_front.storage.stored_session import read_stored_session
 from sfm_front.types import Exif, GeoPosition, Skipped, SkipReason
 
 HIGH, FLAT = GeoPosition(47.5, -8.25, 512.0), GeoPosition(47.5, -8.25)
@@ -36,8 +36,9 @@ def database(tmp_path, scene):
 
 
 def test_it_is_what_was_written(database, scene):
-    session = read_finished_session(database)
+    session = read_stored_session(database)
     assert [photo.image_id for photo in session.photos] == [1, 2, 3]
+    assert session.unused == [Skipped("x.jpg", SkipReason.EMPTY_FILE)]
     assert session.skipped == {"x.jpg": Path("/photos/x.jpg")}
     assert session.cameras[1].params.tolist() == scene.camera.params.tolist()
     first, second = (true_pair(scene, i, i - 1, (i + 1, i)) for i in (1, 2))
@@ -51,12 +52,12 @@ def test_it_is_what_was_written(database, scene):
 
 def test_positions_are_priors_and_without_altitude_those_of_exif(database):
     # The second's altitude was in EXIF, but the session had found it unfit.
-    assert read_finished_session(database).positions == {1: HIGH, 3: FLAT}
+    assert read_stored_session(database).positions == {1: HIGH, 3: FLAT}
 
 
 def test_reading_leaves_no_trace(database):
     before = database.read_bytes()
-    read_finished_session(database)
+    read_stored_session(database)
     assert [path.name for path in database.parent.iterdir()] == ["database.db"]
     assert database.read_bytes() == before
 
@@ -65,6 +66,6 @@ def test_what_is_no_session_is_empty(tmp_path):
     for content in (None, b"", b"no database at all, but long enough to be read as one"):
         if content is not None:
             (tmp_path / "database.db").write_bytes(content)
-        session = read_finished_session(tmp_path / "database.db")
+        session = read_stored_session(tmp_path / "database.db")
         assert not session.photos
         assert session.pairs.shape == (0, 3)

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from sfm_front.storage.colmap_rows import CAMERA_COLUMNS, read_camera
 from sfm_front.storage.session_photos import read_only, stored_photos
 from sfm_front.storage.session_rows import SKIPPED_COLUMNS, read_skipped
-from sfm_front.types import GeoPosition, StoredPhoto
+from sfm_front.types import GeoPosition, Skipped, StoredPhoto
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FinishedSession:
-    """``photos`` in order of arrival; ``skipped``: where files were that were not used, by name.
+class StoredSession:
+    """``photos`` in order of arrival; ``unused``: files that are not, and ``skipped``: where these
+    were, by name.
 
     ``cameras``: as photos started with them, by id. ``pairs`` (P, 3): image ids and the number of
     inliers of each verified pair; ``num_matched``: keypoints of a photo that some verified pair
@@ -28,6 +29,7 @@ class FinishedSession:
     """
 
     photos: Sequence[StoredPhoto] = ()
+    unused: Sequence[Skipped] = ()
     skipped: Mapping[str, Path] = field(default_factory=dict)
     cameras: Mapping[int, pycolmap.Camera] = field(default_factory=dict)
     pairs: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
@@ -35,18 +37,19 @@ class FinishedSession:
     positions: Mapping[int, GeoPosition] = field(default_factory=dict)
 
 
-def read_finished_session(database: Path) -> FinishedSession:
+def read_stored_session(database: Path) -> StoredSession:
     """An empty one if there is no such file, or it cannot be read, or is no session's."""
-    return read_only(database, _read) or FinishedSession()
+    return read_only(database, _read) or StoredSession()
 
 
-def _read(connection: sqlite3.Connection) -> FinishedSession:
+def _read(connection: sqlite3.Connection) -> StoredSession:
     photos = stored_photos(connection)
-    skipped = map(read_skipped, connection.execute(f"SELECT {SKIPPED_COLUMNS}"))
+    skipped = [*map(read_skipped, connection.execute(f"SELECT {SKIPPED_COLUMNS}"))]
     cameras = connection.execute(f"SELECT {CAMERA_COLUMNS}")
     pairs, num_matched = _pairs(connection, {p.image_id: p.num_keypoints for p in photos})
-    return FinishedSession(
+    return StoredSession(
         photos=photos,
+        unused=[file for file, _ in skipped],
         skipped={file.name: state.path for file, state in skipped},
         cameras={row[0]: read_camera(row) for row in cameras},
         pairs=pairs,
@@ -58,7 +61,7 @@ def _read(connection: sqlite3.Connection) -> FinishedSession:
 def _pairs(
     connection: sqlite3.Connection, num_keypoints: Mapping[int, int]
 ) -> tuple[NDArray[np.int64], dict[int, int]]:
-    """See ``FinishedSession``; row by row, for all matches may not fit into memory."""
+    """See ``StoredSession``; row by row, for all matches may not fit into memory."""
     matched = {image_id: np.zeros(count, np.bool_) for image_id, count in num_keypoints.items()}
     pairs = []
     rows = connection.execute("SELECT pair_id, rows, data FROM two_view_geometries WHERE rows > 0")

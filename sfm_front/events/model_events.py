@@ -1,13 +1,10 @@
-"""What happens in a session, as it happens: one type per kind of event."""
+"""What happens to models."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any, TypeAlias
-
-from sfm_front.types import CandidateOutcome, Skipped
+from typing import TypeAlias
 
 
 class StartKind(Enum):
@@ -238,136 +235,6 @@ ModelEvent: TypeAlias = (
     | HeldToControlPoints
     | ControlPointsRefused
 )
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoAdded:
-    """A photo was matched and stored, and registered if it could be.
-
-    ``candidates`` are ordered as re-ranked. ``registered`` names every photo that this step placed:
-    this one, and waiting ones. ``num_registered`` and ``num_points`` are those of all models now.
-    ``seconds`` is by stage; work done ahead counts too. ``events``: what became of the models.
-    """
-
-    name: str
-    image_id: int
-    num_keypoints: int = 0
-    candidates: tuple[CandidateOutcome, ...] = ()
-    registered: tuple[str, ...] = ()
-    num_registered: int = 0
-    num_points: int = 0
-    seconds: dict[str, float] = field(default_factory=dict)
-    events: tuple[ModelEvent, ...] = ()
-
-    @property
-    def most_relevant(self) -> str | None:
-        """The first candidate; None if there was none."""
-        return self.candidates[0].name if self.candidates else None
-
-    @property
-    def verified(self) -> tuple[str, ...]:
-        """Candidates with a verified pair."""
-        return tuple(candidate.name for candidate in self.candidates if candidate.verified)
-
-
-@dataclass(frozen=True, slots=True)
-class SessionStarted:
-    """A session begins, or goes on: ``num_photos`` of it are there already."""
-
-    version: str
-    options: dict[str, Any]
-    num_photos: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoArrived:
-    """A photo was noticed, and will be described."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoDescribed:
-    """A photo has its features and its global vector, and its turn begins.
-
-    ``seconds`` by stage, much of it beside the turns of earlier photos.
-    """
-
-    name: str
-    num_keypoints: int
-    seconds: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoPlaced:
-    """A photo was registered in a model.
-
-    ``quaternion_xyzw`` and ``translation`` are those of cam_from_world; ``camera`` is COLMAP's
-    model with its ``params``, in pixels of the file. ``num_inliers``: points of the model that
-    the photo observes. ``latency_s``: from arrival, None for photos of an earlier run.
-    """
-
-    name: str
-    image_id: int
-    model_id: int
-    quaternion_xyzw: tuple[float, float, float, float]
-    translation: tuple[float, float, float]
-    camera: str
-    params: tuple[float, ...]
-    num_inliers: int
-    latency_s: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoWaiting:
-    """A photo was stored and fits no model yet, and why."""
-
-    name: str
-    image_id: int
-    reason: str
-
-
-class FinishingStep(Enum):
-    """What a session is at once no more photos come; some take minutes for a long flight."""
-
-    LOOK_AGAIN = "matching poorly connected photos once more"
-    REFINE = "refining the models"
-    START_AFRESH = "looking for a better start, and a place for photos without one"
-    LAST_ADJUSTMENT = "last adjustment of all cameras and points"
-    CONTROL_POINTS = "fitting the model to control points"
-    CHECK = "checking the models"
-    WRITE = "writing the models"
-
-
-@dataclass(frozen=True, slots=True)
-class FinishingBegan:
-    """A step of the session's end begins."""
-
-    step: FinishingStep
-
-
-@dataclass(frozen=True, slots=True)
-class SessionEnded:
-    """All models are written, or, if not ``finished``, those of the last snapshot stay."""
-
-    finished: bool
-    num_photos: int
-    num_registered: int
-    num_models: int
-
-
-PhotoEvent: TypeAlias = (
-    PhotoArrived | Skipped | PhotoDescribed | PhotoAdded | PhotoPlaced | PhotoWaiting
-)
-SessionEvent: TypeAlias = SessionStarted | FinishingBegan | SessionEnded
-Event: TypeAlias = PhotoEvent | ModelEvent | SessionEvent
-"""What a listener of a session hears of."""
-
-Emit: TypeAlias = Callable[[ModelEvent], None]
-Listener: TypeAlias = Callable[[Event], None]
-
-# Stages of ``PhotoAdded.seconds`` that run ahead of a photo's turn, beside the mapping of others.
-PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})
 
 
 def _listed(image_ids: tuple[int, ...]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sfm_front.live_page.event_tail import EventTail
+from sfm_front.reports.event_tail import EventTail
 
 
 def test_only_what_is_new_is_read(tmp_path):

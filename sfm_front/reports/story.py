@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 import pycolmap
 
-from sfm_front.live_page.event_words import in_words
-from sfm_front.types import Float64Array
+from sfm_front.reports.event_words import in_words
+from sfm_front.types import Float64Array, WaitingReason
 
 # Lines of what became of models, for reading.
 _MOST_LINES = 200
+GIVEN_UP = "its model was given up"
+"""Why a photo that was placed is in no model any more."""
+
 # Verified pairs below which a photo counts as poorly connected, unless the session says otherwise.
 _FEW_PAIRS = 3
 
@@ -43,12 +46,14 @@ class PlacedPose:
 @dataclass(slots=True, eq=False)
 class PhotoStory:
     """One photo. ``links``: verified pairs, name → inliers; ``similar``: what retrieval proposed,
-    best first. ``time``: seconds since 1970 of the last event of its pose."""
+    best first. ``waiting``: of what kind the ``reason`` is, where that is known. ``time``: seconds
+    since 1970 of the last event of its pose."""
 
     name: str
     state: PhotoState = PhotoState.ARRIVED
     image_id: int | None = None
     reason: str = ""
+    waiting: WaitingReason | None = None
     num_keypoints: int = 0
     num_inliers: int = 0
     similar: tuple[str, ...] = ()
@@ -70,6 +75,8 @@ class Story:
         self.began: float | None = None
         self.last: float | None = None
         self.ended: bool | None = None
+        # Of its end, in words, once that has begun.
+        self.step = ""
         self.num_points = 0
         self.few_pairs = _FEW_PAIRS
         # Model id → when its frame changed last, so that poses of before are elsewhere now.
@@ -102,8 +109,11 @@ class Story:
         return photo
 
     def _on_session_started(self, event: Mapping[str, Any]) -> None:
-        self.began, self.ended = self.last, None
+        self.began, self.ended, self.step = self.last, None, ""
         self.few_pairs = int(event["options"]["second_look"]["min_pairs"])
+
+    def _on_finishing_began(self, event: Mapping[str, Any]) -> None:
+        self.step = in_words(event)
 
     def _on_session_ended(self, event: Mapping[str, Any]) -> None:
         self.ended = bool(event["finished"])
@@ -148,6 +158,7 @@ class Story:
     def _on_photo_waiting(self, event: Mapping[str, Any]) -> None:
         photo = self._photo(event)
         photo.state, photo.reason = PhotoState.WAITING, str(event["reason"])
+        photo.waiting = WaitingReason(event["kind"]) if "kind" in event else None
 
     def _on_looked_again(self, event: Mapping[str, Any]) -> None:
         photo = self.by_id[int(event["image_id"])]

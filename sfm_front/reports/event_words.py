@@ -19,6 +19,17 @@ def in_words(event: Event) -> str:
     return "" if words is None else words(event)
 
 
+def finishing_words(step: str, number: int, num_steps: int, turn: Event | None) -> str:
+    """Of a step of a session's end; ``turn`` with the fields of ``ModelTurn``."""
+    place = f" {number} of {num_steps}" if num_steps > 1 else ""
+    words = f"finishing{place}: {step}"
+    if turn is not None:
+        photos = counted(turn["num_photos"], "photo")
+        of = f"model {turn['number']} of {turn['num_models']}, " if turn["num_models"] > 1 else ""
+        words += f" ({of}{photos})"
+    return words
+
+
 def _started(event: Event) -> str:
     there = int(event["num_photos"])
     return f"session goes on with {counted(there, 'photo')}" if there else "session started"
@@ -63,7 +74,9 @@ def _georeferenced(event: Event) -> str:
 _WORDS: dict[str, Callable[[Event], str]] = {
     "session_started": _started,
     "session_ended": _ended,
-    "finishing_began": lambda e: f"finishing: {e['step']}",
+    "finishing_began": lambda e: finishing_words(
+        str(e["step"]), e.get("number", 1), e.get("num_steps", 1), e.get("turn")
+    ),
     "model_started": lambda e: f"model {e['model_id']} {e['kind']}",
     "model_refined": _refined,
     "model_dropped": lambda e: f"model {e['model_id']} dropped: {e['reason']}",

@@ -1,0 +1,79 @@
+"""What a browser tells that viser has no messages for: a click on a row, dark or light.
+
+viser's markup cannot call back. A number that nobody sees can: at a click, a browser writes to it.
+Rows say which photo they are of by a number, never by its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import viser
+
+from sfm_front.reports.html.markup import Html, tag
+
+_NOTHING, _DARK, _LIGHT = -1, -2, -3
+_PLACE = "sfm-front-signal"
+# React hears of a value only if it is set as if typed.
+_SIGNAL = (
+    f"const field = document.getElementById(document.getElementById('{_PLACE}')?.dataset.field);"
+    "if (field && signal !== undefined) {"
+    "Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value')"
+    ".set.call(field, signal);"
+    "field.dispatchEvent(new Event('input', {bubbles: true})); }"
+)
+_ON_CLICK = f"const signal = event.target.closest('[data-photo]')?.dataset.photo; {_SIGNAL}"
+_ON_LOAD = (
+    "const dark = matchMedia('(prefers-color-scheme: dark)');"
+    f"const tell = () => {{ const signal = dark.matches ? {_DARK} : {_LIGHT}; {_SIGNAL} }};"
+    # The field may still be on its way into the page.
+    "setTimeout(tell, 0); dark.addEventListener('change', tell);"
+)
+_ROW = "cursor:pointer"
+
+
+def clickable(*rows: object, style: str) -> Html:
+    """A list whose rows of ``photo_row`` open their photo."""
+    return tag("div", *rows, style=style, onclick=_ON_CLICK)
+
+
+def photo_row(number: int, *content: object, style: str) -> Html:
+    """A row for the photo of this number, in order of arrival from 0 on."""
+    return tag("div", *content, style=f"{style};{_ROW}", data_photo=number)
+
+
+class BrowserSignals:
+    """Hears one browser."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        on_photo: Callable[[int], None],
+        on_theme: Callable[[bool], None],
+    ) -> None:
+        """``on_photo`` is called with the number of a photo whose row was clicked, ``on_theme``
+        with whether the browser prefers dark: at first, and whenever that changes."""
+        self._on_photo, self._on_theme = on_photo, on_theme
+        self._field = client.gui.add_number("", _NOTHING, step=1)
+        self._field.on_update(lambda _: self._hear(int(self._field.value)))
+        client.gui.add_html(str(_hidden(self._field._impl.uuid)))
+
+    def _hear(self, signal: int) -> None:
+        if signal == _NOTHING:
+            return
+        # That the same row can be clicked again.
+        self._field.value = _NOTHING
+        if signal in (_DARK, _LIGHT):
+            self._on_theme(signal == _DARK)
+        elif signal >= 0:
+            self._on_photo(signal)
+
+
+def _hidden(field: str) -> Html:
+    """Says which field it is, hides it, and runs once it is in the page."""
+    style = f'div:has(> div > div > p > label[for="{field}"]) {{ display: none }}'
+    return tag(
+        "div",
+        tag("span", id=_PLACE, data_field=field),
+        tag("style", Html(style), onload=_ON_LOAD),
+    )
