@@ -24,6 +24,7 @@ PACKAGE = ROOT / "sfm_front"
 # is built.
 FLOORS = (
     ("cli", "evaluation"),
+    ("cluster",),
     ("sfm_front",),
     ("session", "search", "live_page"),
     ("reports", "exporters"),
@@ -62,6 +63,9 @@ LIBRARIES = {
     "matplotlib": ("sfm_front.evaluation",),
     "watchfiles": ("sfm_front.photos.folder_changes",),
     "pyproj": ("sfm_front.photos.crs",),
+    "dask": ("sfm_front.cluster",),
+    "distributed": ("sfm_front.cluster",),
+    "pymetis": ("sfm_front.cluster.groups",),
 }
 
 MAX_FILES_AT_ROOT = 12

@@ -87,6 +87,8 @@ class ProgressLine(LiveLine):
         self._placed = 0
         self._points = 0
         self._is_finishing = False
+        self._counts = True
+        self._said = ""
         self._seconds_a_photo: dict[int, float] = {}
         self._heartbeat = Heartbeat(stream)
 
@@ -110,17 +112,26 @@ class ProgressLine(LiveLine):
         elif isinstance(event, PhotoAdded):
             self._placed, self._points = event.num_registered, event.num_points
             self._added += 1
-            if self._added == _WONDER_AFTER and not self._placed:
+            if self._counts and self._added == _WONDER_AFTER and not self._placed:
                 self.note(_NONE_YET)
         else:
             return
         self._done += 1
+        if not self._counts:
+            return
         # Nobody knows how many are still to come if a folder is watched.
         of = f" of {self._total}" if self._total else ""
         pace = f"  {_pace(self._started, self._done, self._total)}" if self._total else ""
         self._write(
             f"photo {self._done}{of}: {self._placed} placed, {counted(self._points, 'point')}{pace}"
         )
+
+    def say(self, text: str) -> None:
+        """In place of the count of photos, from the first call on."""
+        self._counts = False
+        if text != self._said:
+            self._said = text
+            self._write(text)
 
     def _finishing(self, event: FinishingBegan) -> str:
         turn = event.turn

@@ -49,8 +49,19 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         arguments.usage_error("--idle-timeout goes with --watch")
     if arguments.order != "name" and arguments.watch:
         arguments.usage_error("--watch takes photos as they come: leave --order out")
+    if arguments.cluster is not None and arguments.watch:
+        arguments.usage_error("--watch takes photos as they come: leave --cluster out")
+    if arguments.group_size is not None and arguments.cluster is None:
+        arguments.usage_error("--group-size goes with --cluster")
     if arguments.events and arguments.json:
         arguments.usage_error("--events and --json both take standard output: leave one out")
+    spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
+    progress = ProgressLine(spoken, quiet=arguments.quiet)
+    cluster = None
+    if arguments.cluster is not None:
+        from sfm_front.cli.cluster_run import ClusterRun
+
+        cluster = opened.enter_context(ClusterRun(arguments, progress))
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
@@ -63,6 +74,7 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
         from sfm_front.reports.html.beside_session import ReportBesideSession
         from sfm_front.reports.html.page import write_page
+        from sfm_front.session.given import GivenSession
         from sfm_front.session.output_folder import holds_session, told_of_others
         from sfm_front.session.resume import Newcomers, nothing_to_do
         from sfm_front.session.session import Session
@@ -81,14 +93,14 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             return 0
         if not arguments.watch and (overwrite or not holds_session(output)):
             _check_control_points(options, photos)
-        spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
-        progress = ProgressLine(spoken, quiet=arguments.quiet)
         if others := told_of_others(output):
             progress.note(others)
         on_event = _event_printer() if arguments.events else progress.show
         # Also with --quiet: nobody finds the page without its address.
         page = _page(output, progress.keep, opened) if arguments.viewer else None
-        session = Session(
+        if cluster is not None:
+            cluster.ready()
+        session = (Session if cluster is None else GivenSession)(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
         )
     with session, closing(progress), leaving_at_signal(2, _STOPPING) as interrupted:
@@ -115,11 +127,15 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             arriving = new
         taken = 0
         with ReportBesideSession(output):
-            for _ in session.add_all(arriving):
-                taken += 1
-                if interrupted():
-                    break
-            result = session.finish()
+            if cluster is not None:
+                assert isinstance(session, GivenSession)
+                result, taken = cluster.reconstruct(session, new, interrupted)
+            else:
+                for _ in session.add_all(arriving):
+                    taken += 1
+                    if interrupted():
+                        break
+                result = session.finish()
         progress.step("drawing the page")
         scene_if_possible(output)
         write_page(output)

@@ -171,6 +171,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="best of them matched on all features (default: 8)",
     )
     shared.add_machine(parser)
+    cluster = parser.add_argument_group("cluster")
+    cluster.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="work on a Dask cluster, needs the extra cluster: tcp://HOST:PORT of a scheduler, or "
+        "local:N for N workers on this machine",
+    )
+    cluster.add_argument(
+        "--group-size",
+        type=int,
+        metavar="N",
+        help="photos of which one worker grows a model (default: 300)",
+    )
 
 
 def session_options(arguments: argparse.Namespace) -> SessionOptions:

@@ -80,6 +80,11 @@ class FeatureExtraction(Closeable):
         self._networks = ThreadPoolExecutor(1, "sfm-network")
         self._streams: WeakSet[Generator[ExtractedPhoto | Skipped | NotYet, None, None]] = WeakSet()
 
+    @property
+    def global_descriptor(self) -> GlobalDescriptor:
+        """What makes the global vectors."""
+        return self._global
+
     def describe(self, photo: PhotoPath) -> ExtractedPhoto | Skipped:
         """Read and describe one photo in the calling thread; networks run in a second one."""
         clock = Stopwatch()

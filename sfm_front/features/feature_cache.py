@@ -98,6 +98,10 @@ class FeatureCache:
         """Whether features and every vector have a file; it may be damaged."""
         return self._features.has(keys.features) and all(map(self._vectors.has, keys.vectors))
 
+    def has_local(self, key: str) -> bool:
+        """Whether features have a file; it may be damaged."""
+        return self._features.has(key)
+
     def load_local(self, key: str) -> CachedFeatures | None:
         """None where there is none, or the file is damaged."""
         arrays = self._features.load(key)

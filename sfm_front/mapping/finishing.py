@@ -41,6 +41,12 @@ def finish(
     _Finishing(atlas, restart or Restart(atlas), before_last, on_step).run()
 
 
+def place_all(atlas: Atlas) -> None:
+    """The first part of it alone: all that waits and can be placed has a place then. The models
+    can grow on."""
+    _Finishing(atlas, Restart(atlas), lambda: None, lambda _step, _turn=None: None).place_all()
+
+
 class _Finishing:
     def __init__(
         self,
@@ -58,12 +64,7 @@ class _Finishing:
         self._restart = restart
 
     def run(self) -> None:
-        self._on_step(FinishingStep.REFINE)
-        self._atlas.refine_until_stable()
-        self._on_step(FinishingStep.START_AFRESH)
-        while self._restart.go_on():
-            pass
-        self._start_remaining()
+        self.place_all()
         if unfold(self._atlas):
             self._start_remaining()
         self._fix_intrinsics()
@@ -84,6 +85,14 @@ class _Finishing:
             model.finish()
         self._drop_without_pairs()
         self._atlas.drop_covered()
+
+    def place_all(self) -> None:
+        self._on_step(FinishingStep.REFINE)
+        self._atlas.refine_until_stable()
+        self._on_step(FinishingStep.START_AFRESH)
+        while self._restart.go_on():
+            pass
+        self._start_remaining()
 
     def _fix_intrinsics(self) -> None:
         """Grow models anew whose photos do not tell what their camera is, with what EXIF says.

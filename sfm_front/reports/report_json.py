@@ -9,6 +9,7 @@ from typing import Any
 from sfm_front.errors import InputError
 from sfm_front.georeference.sidecar import as_row, of_row
 from sfm_front.reports.camera_outcome import camera_rows, cameras_from_rows
+from sfm_front.reports.cluster_outcome import cluster_of_row, cluster_row
 from sfm_front.reports.run_summary import (
     AuditOutcome,
     GeoreferenceOutcome,
@@ -54,6 +55,7 @@ def as_content(summary: RunSummary) -> dict[str, Any]:
         "look_alikes": summary.look_alikes,
         "georeference": _georeference_row(summary.georeference),
         "cameras": camera_rows(summary.cameras),
+        "cluster": cluster_row(summary.cluster),
         "totals": {
             "photos": totals.num_photos,
             "used": totals.num_used,
@@ -185,6 +187,7 @@ def _summary(content: dict[str, Any]) -> RunSummary:
         ),
         georeference=_georeference(content.get("georeference")),  # absent in earlier versions
         cameras=cameras_from_rows(content.get("cameras", ())),  # absent in earlier versions
+        cluster=cluster_of_row(content.get("cluster")),  # absent in earlier versions
     )
 
 

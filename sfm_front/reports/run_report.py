@@ -20,6 +20,7 @@ from sfm_front.events import (
 )
 from sfm_front.mapping.audit import ModelAudit
 from sfm_front.reports.camera_outcome import CameraOutcome
+from sfm_front.reports.cluster_outcome import ClusterOutcome
 from sfm_front.reports.run_summary import (
     AuditOutcome,
     GeoreferenceOutcome,
@@ -41,6 +42,7 @@ class RunReport:
         self._photos: list[Skipped | PhotoAdded] = []
         self._restored: set[int] = set()
         self._skipped: dict[str, Skipped] = {}
+        self.cluster: ClusterOutcome | None = None
 
     def add(self, photo: Skipped | PhotoAdded) -> None:
         """Note a photo. One that was skipped, cut off perhaps, and comes again counts once."""
@@ -106,6 +108,7 @@ class RunReport:
             look_alikes=self._look_alikes(events),
             georeference=georeference,
             cameras=tuple(cameras),
+            cluster=self.cluster,
         )
 
     def _look_alikes(self, events: Iterable[ModelEvent]) -> tuple[tuple[tuple[str, ...], ...], ...]:

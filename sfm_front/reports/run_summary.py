@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from sfm_front.reports.camera_outcome import CameraOutcome
+from sfm_front.reports.cluster_outcome import ClusterOutcome
 from sfm_front.types import Skipped, WaitingReason
 
 if TYPE_CHECKING:  # The command line reads this before anything heavy may be loaded.
@@ -139,7 +140,8 @@ class RunSummary:
 
     ``end_events`` are those of idle times, too. ``look_alikes``: names of the photos of two groups
     that show things that look alike, each time a model was taken apart for it. ``georeference``:
-    None where nothing is known of positions. ``cameras``: of each model.
+    None where nothing is known of positions. ``cameras``: of each model. ``cluster``: what its
+    workers did; None in a session of one process.
     """
 
     photos: tuple[Outcome, ...]
@@ -150,6 +152,7 @@ class RunSummary:
     look_alikes: tuple[tuple[tuple[str, ...], ...], ...] = ()
     georeference: GeoreferenceOutcome | None = None
     cameras: tuple[CameraOutcome, ...] = ()
+    cluster: ClusterOutcome | None = None
 
     @property
     def sidecar(self) -> Sidecar | None:

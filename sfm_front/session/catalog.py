@@ -30,7 +30,7 @@ class PhotoCatalog(Mapping[int, View]):
         self._camera_of: dict[int, pycolmap.Camera] = {}
         self._names: dict[int, str] = {}
         self._colors: dict[int, Uint8Array] = {}
-        self._features = _FeatureMemory(stored, max_bytes)
+        self._features = FeatureMemory(stored, max_bytes)
 
     def admit(self, photo: ExtractedPhoto) -> View | Skipped:
         """Give a photo that has just arrived its image id and camera; Skipped if it is a copy."""
@@ -57,6 +57,10 @@ class PhotoCatalog(Mapping[int, View]):
         """What the photo is called in the models."""
         return self._names[image_id]
 
+    def camera(self, image_id: int) -> pycolmap.Camera:
+        """A photo's, as it started with it."""
+        return self._camera_of[image_id]
+
     @property
     def colors(self) -> Mapping[int, Uint8Array]:
         """Image id → (N, 3) uint8 RGB under each keypoint."""
@@ -77,7 +81,7 @@ class PhotoCatalog(Mapping[int, View]):
         return len(self._names)
 
 
-class _FeatureMemory:
+class FeatureMemory:
     """Features in memory, those not looked at for longest dropped first."""
 
     def __init__(self, stored: Callable[[int], Features], max_bytes: int) -> None:

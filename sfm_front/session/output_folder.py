@@ -29,6 +29,10 @@ _FILES = (
 # Of what else lies in the folder.
 _MOST_NAMED = 3
 _MODELS = ("sparse", "sparse.new", "sparse.old")
+WORKING_FOLDER = "cluster"
+"""What workers of a cluster have made, until it is in the output itself."""
+
+_WORKING = frozenset({"features", "vectors", "models", "token"})
 _MODEL_NAME = re.compile(r"\d+")
 _MODEL_FILES = frozenset(
     {
@@ -51,7 +55,7 @@ def check_output_folder(output: Path, *, overwrite: bool, resume: bool = False) 
     """
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: not a folder. Give another --output.")
-    taken = [name for name in (*_FILES, *_MODELS) if _is_there(output / name)]
+    taken = [name for name in (*_FILES, *_MODELS, WORKING_FOLDER) if _is_there(output / name)]
     if not taken:
         return
     if not _is_own_file(output / _MARKER):
@@ -116,9 +120,14 @@ def holds_session(output: Path) -> bool:
     return _is_own_file(output / _MARKER) and _is_own_file(output / DATABASE)
 
 
+def remove_working_folder(output: Path) -> None:
+    """What workers made is in the output itself."""
+    shutil.rmtree(output / WORKING_FOLDER, ignore_errors=True)
+
+
 def _clear(output: Path) -> None:
     """Remove what a session wrote; the marker stays, so that a second try may replace the rest."""
-    for name in _MODELS:
+    for name in (*_MODELS, WORKING_FOLDER):
         if (output / name).is_dir():
             shutil.rmtree(output / name)
     for name in _FILES:
@@ -151,6 +160,7 @@ def _foreign(output: Path) -> Iterator[Path]:
         path = output / name
         if _is_there(path) and not _is_own_file(path):
             yield path
+    yield from _foreign_working(output / WORKING_FOLDER)
     for name in _MODELS:
         folder = output / name
         if not _is_there(folder):
@@ -170,3 +180,14 @@ def _foreign(output: Path) -> Iterator[Path]:
             for file in model.iterdir():
                 if file.name not in _MODEL_FILES or not _is_own_file(file):
                     yield file
+
+
+def _foreign_working(folder: Path) -> Iterator[Path]:
+    if not _is_there(folder):
+        return
+    if folder.is_symlink() or not folder.is_dir():
+        yield folder
+        return
+    for path in folder.iterdir():
+        if path.name not in _WORKING and not is_partial(path.name, "token"):
+            yield path

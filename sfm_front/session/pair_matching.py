@@ -14,7 +14,6 @@ from sfm_front.matching.verification import Verifier
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.runtime.worker_pool import WorkerPool
-from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.types import (
     Candidate,
     CandidateOutcome,
@@ -176,13 +175,13 @@ def candidate_outcomes(
     candidates: Iterable[RankedCandidate | Candidate],
     pairs: Iterable[PairGeometry],
     rejected: Mapping[int, Rejected],
-    catalog: PhotoCatalog,
+    name_of: Callable[[int], str],
 ) -> tuple[CandidateOutcome, ...]:
-    """What became of each candidate of a photo, in their order."""
+    """What became of each candidate of a photo, in their order. ``name_of``: by image id."""
     verified = {pair.image_id2 for pair in pairs}
     return tuple(
         CandidateOutcome(
-            catalog.name(candidate.image_id),
+            name_of(candidate.image_id),
             candidate.cosine,
             candidate.inliers,
             candidate.image_id in verified,

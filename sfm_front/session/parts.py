@@ -12,9 +12,6 @@ from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.background_refinement import BackgroundAdjuster
 from sfm_front.mapping.restart import Restart
 from sfm_front.mapping.view_graph import ViewGraph
-from sfm_front.matching.guided_matching import GuidedMatcher
-from sfm_front.matching.matcher import make_matcher
-from sfm_front.matching.verification import Verifier
 from sfm_front.photos.cameras import CameraCatalog
 from sfm_front.photos.positions import OFF
 from sfm_front.photos.reader import PhotoReader
@@ -26,6 +23,7 @@ from sfm_front.session.announcer import Announcer
 from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.session.control_points import ControlPoints
 from sfm_front.session.georeferencing import Georeferencing
+from sfm_front.session.matching_parts import make_matching
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.pair_matching import CandidateMatcher
 from sfm_front.session.photo_folders import PhotoFolders
@@ -66,7 +64,7 @@ def open_parts(
     announcer: Announcer,
 ) -> SessionParts:
     """Make all parts; ``opened`` closes those that hold threads, processes or files."""
-    threads, rotation = options.threads, options.matching.rotation
+    threads = options.threads
     extraction = opened.enter_context(
         FeatureExtraction(
             PhotoReader(max_image_size=options.max_image_size),
@@ -76,16 +74,7 @@ def open_parts(
         )
     )
     workers = opened.enter_context(WorkerPool(threads))
-    verifier = Verifier(options.verification)
-    matcher = make_matcher(device, options.matching, workers)
-    reranker, second_reranker = (
-        Reranker(rerank, matcher, verifier, workers, rotation=rotation)
-        for rerank in (options.rerank, options.second_rerank)
-    )
-    guided = GuidedMatcher(options.guided, options.matching, options.verification, workers)
-    pairs = CandidateMatcher(
-        options.pair_matching, matcher, second_reranker, verifier, guided, workers
-    )
+    matching = make_matching(options, device, workers)
     database = opened.enter_context(PhotoDatabase(output / DATABASE))
     # With one thread a session is the same to the bit each time: nothing runs beside it.
     adjuster = opened.enter_context(BackgroundAdjuster()) if threads > 1 else None
@@ -97,8 +86,8 @@ def open_parts(
     second_look = SecondLook(
         options.second_look,
         retriever,
-        matcher,
-        verifier,
+        matching.matcher,
+        matching.verifier,
         workers,
         catalog,
         database,
@@ -108,8 +97,8 @@ def open_parts(
     return SessionParts(
         extraction=extraction,
         retriever=retriever,
-        reranker=reranker,
-        pairs=pairs,
+        reranker=matching.reranker,
+        pairs=matching.pairs,
         database=database,
         catalog=catalog,
         view_graph=view_graph,
@@ -128,8 +117,11 @@ def open_parts(
     )
 
 
-def restore(parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer) -> None:
-    """Go on with the photos in the database: models from the snapshot, what came after it anew."""
+def restore(
+    parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer, *, grow: bool = True
+) -> None:
+    """Go on with the photos in the database: models from the snapshot, what came after it anew,
+    unless somebody else is to ``grow`` models of it."""
     database, atlas = parts.database, parts.atlas
     for skipped, _ in database.skipped():
         parts.report.add(skipped)
@@ -152,6 +144,8 @@ def restore(parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer
             atlas.restore(snapshot.models)
             if snapshot.georeferencing is not None:
                 parts.georeferencing.restore(snapshot.georeferencing)
+        elif image_id > num_mapped and not grow:
+            atlas.know(image_id)
         elif image_id > num_mapped:
             placed = atlas.add(image_id)
             parts.georeferencing.follow(atlas.models)

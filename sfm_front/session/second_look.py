@@ -8,7 +8,7 @@ features had eight among those that re-ranking looks at.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from sfm_front.retrieval.retriever import Retriever
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.catalog import PhotoCatalog
 from sfm_front.storage.database import PhotoDatabase
-from sfm_front.types import PairGeometry, Rejected, Uint32Array, View
+from sfm_front.types import PairGeometry, Rejected, Rejection, Uint32Array, View
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +90,17 @@ class SecondLook:
         for other in others:
             self._known[image_id].add(other)
             self._known[other].add(image_id)
+
+    def after(
+        self, image_id: int, pairs: Iterable[PairGeometry], rejected: Mapping[int, Rejected]
+    ) -> int | None:
+        """Note what a photo that was added has been matched with: its verified pairs and those
+        rejected, by image id. Returns the earlier photo to look at now, if one is due."""
+        self.note(image_id, (pair.image_id2 for pair in pairs))
+        # The unlikely ones were not matched on all features.
+        matched = (i for i, why in rejected.items() if why.reason is not Rejection.UNLIKELY)
+        self.note(image_id, matched)
+        return self.due_after(image_id)
 
     def due_after(self, image_id: int) -> int | None:
         """The earlier photo to look at again once this one was added: it still waits, with few

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TypeVar
@@ -13,7 +13,6 @@ from sfm_front.events import (
     FinishingStep,
     Listener,
     ModelEvent,
-    ModelRefined,
     PhotoAdded,
     PhotoDescribed,
     SessionEnded,
@@ -33,23 +32,28 @@ from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.session.announcer import Announcer
 from sfm_front.session.control_points import ControlPoints
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.output_folder import check_output_folder, open_output_folder
+from sfm_front.session.output_folder import (
+    check_output_folder,
+    open_output_folder,
+    remove_working_folder,
+)
 from sfm_front.session.pair_matching import candidate_outcomes
 from sfm_front.session.parts import open_parts, restore
+from sfm_front.session.photo_account import photo_added
 from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.resume import as_dict, check_options, mark_finished, mark_running
 from sfm_front.session.snapshots import MakeSidecar, Snapshots, read_snapshot
 from sfm_front.session.summing_up import SessionResult, sum_up
 from sfm_front.storage.database import PhotoDatabase
 from sfm_front.types import (
+    CandidateOutcome,
     ExtractedPhoto,
     ModelSummary,
     NotYet,
     PairGeometry,
     PhotoPath,
-    Rejected,
-    Rejection,
     Skipped,
+    View,
 )
 from sfm_front.version import VERSION
 
@@ -154,7 +158,10 @@ class Session(Closeable):
         self.num_restored = self.database.num_photos()
         self._announcer.tell(SessionStarted(VERSION, as_dict(self.options), self.num_restored))
         mark_running(self.database, self.options)
-        snapshot = read_snapshot(self.output / "sparse") if known else None
+        self._restore(is_known=known)
+
+    def _restore(self, *, is_known: bool) -> None:
+        snapshot = read_snapshot(self.output / "sparse") if is_known else None
         restore(self._parts, snapshot, self._announcer)
 
     def add(self, path: Path, name: str | None = None) -> PhotoAdded | Skipped:
@@ -275,6 +282,7 @@ class Session(Closeable):
         )
         write_report(self.output, summary)
         mark_finished(self.database)
+        remove_working_folder(self.output)
         totals = summary.totals
         self._announcer.tell(
             SessionEnded(True, totals.num_used, totals.num_registered, len(models))
@@ -349,7 +357,24 @@ class Session(Closeable):
             clock=clock,
         )
         unranked = candidates[len(ranked) :]
-        outcomes = candidate_outcomes([*ranked, *unranked], pairs, rejected, parts.catalog)
+        outcomes = candidate_outcomes([*ranked, *unranked], pairs, rejected, parts.catalog.name)
+        added = self._enter(photo, view, pairs, outcomes, clock)
+        parts.retriever.remember(image_id, photo.global_vector)
+        due = parts.second_look.after(image_id, pairs, rejected)
+        if due is not None:
+            self._placing_more(lambda: parts.second_look.at_photo(due))
+        return added
+
+    def _enter(
+        self,
+        photo: ExtractedPhoto,
+        view: View,
+        pairs: Sequence[PairGeometry],
+        outcomes: tuple[CandidateOutcome, ...],
+        clock: Stopwatch,
+    ) -> PhotoAdded:
+        """Store and map a matched photo, and tell of it."""
+        parts, image_id = self._parts, view.image_id
         with clock.stage("store"):
             parts.control_points.take(photo.name, (photo.width, photo.height))
             prior = parts.positions.take(image_id, photo.name, photo.exif)
@@ -357,44 +382,18 @@ class Session(Closeable):
         with clock.stage("map"):
             keypoints = photo.features.keypoints
             parts.view_graph.add(image_id, photo.name, view.camera, keypoints, pairs)
-            registered = parts.atlas.add(image_id)
-            parts.georeferencing.follow(parts.atlas.models)
-        parts.retriever.remember(image_id, photo.global_vector)
+            registered = self._map(image_id)
         events = self._announcer.pop_model_events()
-        # Apart from the rest of mapping: it alone depends on how many photos came before.
-        refinements = [event for event in events if isinstance(event, ModelRefined)]
-        clock.move("map", "refine", sum(event.seconds for event in refinements))
-        added = PhotoAdded(
-            name=photo.name,
-            image_id=image_id,
-            num_keypoints=len(photo.features),
-            candidates=outcomes,
-            registered=tuple(parts.catalog.name(i) for i in registered),
-            num_registered=len(parts.atlas.registered),
-            num_points=parts.atlas.num_points,
-            seconds={**photo.seconds, **clock.seconds},
-            events=events,
-        )
+        added = photo_added(parts, photo, image_id, outcomes, registered, clock, events)
         self._is_settled = False
-        self._tell(added, registered)
-        self._look_again_after(image_id, pairs, rejected)
-        return added
-
-    def _look_again_after(
-        self, image_id: int, pairs: Iterable[PairGeometry], rejected: Mapping[int, Rejected]
-    ) -> None:
-        """At an earlier photo, if one is due once this one was added and matched."""
-        second_look = self._parts.second_look
-        second_look.note(image_id, (pair.image_id2 for pair in pairs))
-        # The unlikely ones were not matched on all features.
-        matched = (i for i, why in rejected.items() if why.reason is not Rejection.UNLIKELY)
-        second_look.note(image_id, matched)
-        due = second_look.due_after(image_id)
-        if due is not None:
-            self._placing_more(lambda: second_look.at_photo(due))
-
-    def _tell(self, added: PhotoAdded, registered: Sequence[int]) -> None:
-        self._parts.report.add(added)
+        parts.report.add(added)
         self._retrieval_log.add(added)
         self._announcer.tell(added)
-        self._announcer.tell_outcome(self._parts.atlas, added.image_id, registered)
+        self._announcer.tell_outcome(parts.atlas, image_id, registered)
+        return added
+
+    def _map(self, image_id: int, /) -> list[int]:
+        """Place what can be placed once this photo is in the view graph."""
+        registered = self._parts.atlas.add(image_id)
+        self._parts.georeferencing.follow(self._parts.atlas.models)
+        return registered
