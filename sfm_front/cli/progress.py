@@ -96,7 +96,7 @@ class ProgressLine(LiveLine):
         elif isinstance(event, PhotoAdded):
             self._placed, self._points = event.num_registered, event.num_points
             self._added += 1
-            if self._added == _WONDER_AFTER and not self._placed:
+            if self._counts and self._added == _WONDER_AFTER and not self._placed:
                 self.note(_NONE_YET)
         else:
             return

@@ -24,7 +24,6 @@ from sfm_front.photos.source import list_photos, order_photos
 from sfm_front.reports.words import counted
 
 if TYPE_CHECKING:
-    from sfm_front.cli.cluster_run import ClusterRun
     from sfm_front.live_page.beside_session import PageBesideSession
     from sfm_front.session.options import SessionOptions
     from sfm_front.types import NotYet, PhotoPath
@@ -56,6 +55,13 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         arguments.usage_error("--group-size goes with --cluster")
     if arguments.events and arguments.json:
         arguments.usage_error("--events and --json both take standard output: leave one out")
+    spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
+    progress = ProgressLine(spoken, quiet=arguments.quiet)
+    cluster = None
+    if arguments.cluster is not None:
+        from sfm_front.cli.cluster_run import ClusterRun
+
+        cluster = opened.enter_context(ClusterRun(arguments, progress))
     import pycolmap
 
     pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
@@ -67,6 +73,7 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         from sfm_front.live_page.extra import scene_if_possible
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
         from sfm_front.reports.html.page import write_page
+        from sfm_front.session.given import GivenSession
         from sfm_front.session.output_folder import holds_session
         from sfm_front.session.resume import Newcomers, nothing_to_do
         from sfm_front.session.session import Session
@@ -85,17 +92,11 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             return 0
         if not arguments.watch and (overwrite or not holds_session(output)):
             _check_control_points(options, photos)
-        spoken = sys.stderr if arguments.events or arguments.json else sys.stdout
-        progress = ProgressLine(spoken, quiet=arguments.quiet)
         on_event = _event_printer() if arguments.events else progress.show
         # Also with --quiet: nobody finds the page without its address.
         page = _page(output, progress.keep, opened) if arguments.viewer else None
-        cluster: ClusterRun | None = None
-        if arguments.cluster is not None:
-            from sfm_front.cli.cluster_run import ClusterRun
-            from sfm_front.session.given import GivenSession
-
-            cluster = opened.enter_context(ClusterRun(arguments, progress))
+        if cluster is not None:
+            cluster.ready()
         session = (Session if cluster is None else GivenSession)(
             output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 # A scheduler that does not answer within this time is not there.
-_CONNECT_S = 10
+_CONNECT_S = 5
 # How long the first worker may be waited for.
 _FIRST_WORKER_S = 60
 # pycolmap holds the interpreter's lock while it adjusts: a worker says nothing meanwhile.
@@ -24,13 +25,15 @@ _ASK = "__import__('sfm_front.cluster.identity', fromlist=['identity']).identity
 
 
 class Cluster:
-    """Workers that have this package, and no others: those that join later are looked at, too."""
+    """Those workers of a scheduler that have this package; others, also ones that join later, are
+    left alone and given nothing."""
 
     def __init__(self, client: Client, address: str, note: Callable[[str], None]) -> None:
         self.client = client
         self.address = address
-        self._note = note
-        self._known: set[str] = set()
+        self.note = note
+        self._threads: dict[str, int] = {}
+        self._refused: dict[str, str] = {}
 
     @property
     def dashboard(self) -> str | None:
@@ -38,29 +41,43 @@ class Cluster:
         link: str | None = self.client.dashboard_link
         return link
 
+    @property
+    def workers(self) -> frozenset[str]:
+        """Addresses of those that are used, when they were looked at last."""
+        return frozenset(self._threads)
+
+    @property
     def num_threads(self) -> int:
         """Tasks that can run at once."""
-        workers: dict[str, Any] = self.client.scheduler_info(n_workers=-1)["workers"]
-        return sum(int(worker["nthreads"]) for worker in workers.values())
+        return sum(self._threads.values())
 
-    def check_workers(self) -> None:
-        """Look at workers that are new; those with another package are sent away, with a line."""
-        new = self._workers() - self._known
-        if not new:
-            return
-        self._known |= new
+    def look(self) -> None:
+        """Note which workers have come and gone; a line for each that is not used."""
+        there: dict[str, Any] = self.client.scheduler_info(n_workers=-1)["workers"]
+        new = there.keys() - self._threads.keys() - self._refused.keys()
         for address, found in self._ask(new).items():
-            if found != identity():
-                self.refuse(address, found)
-
-    def refuse(self, address: str, found: str) -> None:
-        """Send a worker away that has another package."""
-        self._note(f"worker {address} is refused: it has {found}, this is {identity()}")
-        self.client.retire_workers([address], close_workers=True)
+            if found == identity():
+                continue
+            self._refused[address] = found
+            self.note(f"worker {address} is not used: it has {found}, this is {identity()}")
+        self._threads = {
+            address: int(worker["nthreads"])
+            for address, worker in there.items()
+            if address not in self._refused
+        }
 
     def require_workers(self) -> None:
-        """Wait for the first one. Raises InputError if none comes, ConfigError if one that is
-        there has another package."""
+        """Wait for the first one. Raises InputError if none comes, ConfigError if none can be
+        used."""
+        try:
+            self.client.run_on_scheduler(eval, _ASK)
+        except ImportError as error:
+            raise ConfigError(
+                f"the scheduler at {self.address} cannot load sfm-front ({error}): start it where "
+                "this package is installed"
+            ) from error
+        if not self.client.scheduler_info(n_workers=-1)["workers"]:
+            self.note(f"waiting for the first worker at {self.address}")
         try:
             self.client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
         except TimeoutError as error:
@@ -68,20 +85,21 @@ class Cluster:
                 f"{self.address}: no worker has come in {_FIRST_WORKER_S} s. Start some with "
                 f"dask worker {self.address} --nthreads 1"
             ) from error
-        self._known |= self._workers()
-        for address, found in self._ask(self._known).items():
-            if found != identity():
-                raise ConfigError(
-                    f"worker {address} has {found}, this is {identity()}. Install the same there."
-                )
-
-    def _workers(self) -> set[str]:
-        return set(self.client.scheduler_info(n_workers=-1)["workers"])
+        self.look()
+        if not self._threads:
+            found = ", ".join(sorted(set(self._refused.values())))
+            raise ConfigError(
+                f"no worker at {self.address} can be used: they have {found}, this is "
+                f"{identity()}. Install the same everywhere."
+            )
 
     def _ask(self, addresses: Iterable[str]) -> dict[str, str]:
         """What each has for this package; in words, if it has none."""
+        asked = list(addresses)
+        if not asked:
+            return {}
         # What is run is found by any Python: a worker without the package can answer.
-        found = self.client.run(eval, _ASK, workers=list(addresses), on_error="return")
+        found = self.client.run(eval, _ASK, workers=asked, on_error="return")
         return {
             address: f"no sfm-front ({answer})" if isinstance(answer, BaseException) else answer
             for address, answer in found.items()
@@ -99,9 +117,7 @@ def connected(options: ClusterOptions, note: Callable[[str], None]) -> Iterator[
     import dask
     from distributed import Client
 
-    for name in ("distributed", "tornado"):
-        # Each death of a worker would be told with a traceback; ours is a line.
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    _silence()
     with ExitStack() as opened:
         opened.enter_context(dask.config.set(_config(options)))
         target: Any = options.address
@@ -121,6 +137,13 @@ def connected(options: ClusterOptions, note: Callable[[str], None]) -> Iterator[
         yield cluster
 
 
+def _silence() -> None:
+    """Each death of a worker would be told with a traceback; ours is a line."""
+    named = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]
+    for name in ("distributed", "tornado", *named):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
 def _config(options: ClusterOptions) -> dict[str, Any]:
     """Of this process, and of the scheduler and workers that it starts."""
     config: dict[str, Any] = {
@@ -137,10 +160,13 @@ def _config(options: ClusterOptions) -> dict[str, Any]:
 def _local_cluster(num_workers: int) -> Any:
     from distributed import LocalCluster
 
+    # A process that is left at once cannot clean up after itself; what does so would say it.
+    sys.warnoptions.append("ignore:resource_tracker")
     return LocalCluster(
         n_workers=num_workers,
         threads_per_worker=1,
         processes=True,
+        preload=["sfm_front.cluster.preload"],
         host="127.0.0.1",
         dashboard_address="127.0.0.1:0",
         silence_logs=logging.CRITICAL,

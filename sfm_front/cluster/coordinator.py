@@ -10,12 +10,11 @@ from sfm_front.cluster.connection import Cluster
 from sfm_front.cluster.features import FeatureStore
 from sfm_front.cluster.figures import Figures
 from sfm_front.cluster.group_stage import GroupStage
-from sfm_front.cluster.identity import identity
 from sfm_front.cluster.options import ClusterOptions
 from sfm_front.cluster.photo_stage import PhotoStage, batch_size
 from sfm_front.cluster.storage_probe import all_see_photo, all_see_token
 from sfm_front.cluster.task_queue import TaskQueue
-from sfm_front.cluster.work import DESCRIBE, GROW, MATCH, RunSettings
+from sfm_front.cluster.work import DESCRIBE, GROW, JOIN, MATCH, RunSettings
 from sfm_front.cluster.workbench import extraction_settings
 from sfm_front.cluster.working_folder import WorkingFolder
 from sfm_front.features.extraction import make_extractor
@@ -35,6 +34,8 @@ class ClusterProgress:
     num_matched: int
     num_groups: int
     num_grown: int
+    num_joins: int
+    num_joined: int
     num_placed: int
     num_workers: int
     num_under_way: int
@@ -63,16 +64,20 @@ class Coordinator:
         reader = PhotoReader(max_image_size=session.options.max_image_size)
         device, _ = usable_device(session.options.device)
         sift = make_extractor(device, session.options.sift)
-        descriptor = session.global_descriptor
+        descriptor, weights = session.global_descriptor, session.options.weights
         with self._figures.serial("probe"):
             token, content = self._folder.write_token()
             self.is_shared = all_see_token(cluster, token, content)
             sees_photos = not photos or all_see_photo(cluster, photos[0].path)
         settings = RunSettings(
             run_id=uuid4().hex,
-            identity=identity(),
             # By its parts: auto might find other weights on another machine.
-            options=replace(session.options, global_descriptor=descriptor.name, threads=1),
+            options=replace(
+                session.options,
+                global_descriptor=descriptor.name,
+                weights=None if weights is None else weights.absolute(),
+                threads=1,
+            ),
             descriptor=descriptor.fingerprint,
             cache=self._folder.path if self.is_shared else None,
         )
@@ -98,12 +103,10 @@ class Coordinator:
         return self._photos.num_entered
 
     def run(self, is_stopped: Callable[[], bool]) -> SessionResult:
-        """All of it. Once it is stopped, what has been begun ends, and the photos taken so far are
-        finished with."""
+        """All of it. Once it is stopped, no more photos are begun: those taken so far are finished
+        with."""
         self._photos.run(is_stopped)
-        if is_stopped():
-            self._queue.give_up()
-        self._groups.run(is_stopped)
+        self._groups.run()
         self._queue.close()
         self._session.note_cluster(
             self._figures.outcome(
@@ -113,9 +116,7 @@ class Coordinator:
                 group_size=self._options.group_size,
             )
         )
-        result = self._session.finish()
-        self._folder.remove()
-        return result
+        return self._session.finish()
 
     def _tell(self) -> None:
         photos, groups = self._photos, self._groups
@@ -125,7 +126,9 @@ class Coordinator:
                 num_described=photos.num_described,
                 num_matched=photos.num_entered,
                 num_groups=groups.num_groups,
-                num_grown=groups.num_done,
+                num_grown=groups.num_grown,
+                num_joins=groups.num_joins,
+                num_joined=groups.num_joined,
                 num_placed=self._session.num_placed,
                 num_workers=self._queue.num_threads,
                 num_under_way=self._queue.num_under_way,
@@ -139,7 +142,8 @@ class Coordinator:
         tasks = {
             DESCRIBE: (photos.num_photos - photos.num_described) / self._batch_size,
             MATCH: (photos.num_photos - photos.num_entered) / self._batch_size,
-            GROW: float(groups.num_groups - groups.num_done),
+            GROW: float(groups.num_groups - groups.num_grown),
+            JOIN: float(groups.num_joins - groups.num_joined),
         }
         left = 0.0
         for kind, number in tasks.items():

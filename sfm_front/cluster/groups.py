@@ -71,8 +71,7 @@ def _parts(graph: ViewGraph, photos: Sequence[int], number: int) -> list[set[int
         offsets.append(len(neighbors))
     _, part_of = pymetis.part_graph(
         number,
-        xadj=offsets,
-        adjncy=neighbors,
+        pymetis.CSRAdjacency(offsets, neighbors),
         eweights=weights,
         options=pymetis.Options(seed=0, contig=True),
         recursive=False,

@@ -1,4 +1,4 @@
-"""On a worker: a group of photos and its verified pairs → models, as a session grows them."""
+"""On a worker: groups of photos and their verified pairs → models, as a session makes them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pycolmap
 
-from sfm_front.cluster.work import GroupWork, GrownModel
+from sfm_front.cluster.work import GroupPhoto, GroupWork, GrownModel, JoinWork
 from sfm_front.cluster.workbench import Counts, Workbench
 from sfm_front.mapping.atlas import Atlas
 from sfm_front.mapping.finishing import place_all
@@ -23,13 +23,29 @@ def grow(bench: Workbench, work: GroupWork, counts: Counts) -> list[GrownModel]:
     graph = ViewGraph()
     atlas = Atlas(graph, bench.options.atlas)
     for photo in work.photos:
-        camera = work.cameras[photo.camera_id]
-        pairs = work.pairs.get(photo.image_id, ())
-        graph.add(photo.image_id, photo.name, camera, photo.points, pairs)
+        _enter(photo, work, graph)
         atlas.add(photo.image_id)
     place_all(atlas)
     counts.items += len(work.photos)
     return [_packed(model) for model in atlas.models]
+
+
+def join(bench: Workbench, work: JoinWork, counts: Counts) -> list[GrownModel]:
+    """The models of two groups, joined where they fit and grown by what waits."""
+    graph = ViewGraph()
+    for photo in work.group.photos:
+        _enter(photo, work.group, graph)
+    atlas = Atlas(graph, bench.options.atlas)
+    for reconstruction, state in unpacked(work.models):
+        atlas.take_model(reconstruction, state)
+    atlas.grow()
+    counts.items += len(work.group.photos)
+    return [_packed(model) for model in atlas.models]
+
+
+def _enter(photo: GroupPhoto, work: GroupWork, graph: ViewGraph) -> None:
+    camera, pairs = work.cameras[photo.camera_id], work.pairs.get(photo.image_id, ())
+    graph.add(photo.image_id, photo.name, camera, photo.points, pairs)
 
 
 def _packed(model: Model) -> GrownModel:

@@ -23,19 +23,18 @@ from sfm_front.types import (
     Skipped,
 )
 
-DESCRIBE, MATCH, GROW = "describe", "match", "grow"
+DESCRIBE, MATCH, GROW, JOIN = "describe", "match", "grow", "join"
 
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
     """The same for all tasks of a run.
 
-    ``identity`` of the coordinator's package; ``descriptor``: fingerprint of its global descriptor;
+    ``descriptor``: fingerprint of its global descriptor;
     ``cache``: the folder of features if workers see it too, else None.
     """
 
     run_id: str
-    identity: str
     options: SessionOptions
     descriptor: str
     cache: Path | None
@@ -124,6 +123,14 @@ class GrownModel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class JoinWork:
+    """Two groups as one, and the models that were grown of them."""
+
+    group: GroupWork
+    models: tuple[GrownModel, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Answer:
     """What a worker gives back: the pickled result, and what it took.
 
@@ -132,22 +139,12 @@ class Answer:
 
     result: bytes
     worker: str
-    started: float
     seconds: float
     cpu_seconds: float
     items: int
     reused: int
     bytes_in: int
     bytes_out: int
-
-
-class WrongVersionError(Exception):
-    """A worker has other code than the coordinator: its address, and which."""
-
-    def __init__(self, address: str, found: str) -> None:
-        super().__init__(address, found)
-        self.address = address
-        self.found = found
 
 
 def pack(value: Any) -> bytes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.feature_cache import ExtractionSettings, FeatureCache
 from sfm_front.features.global_descriptors.descriptor import resolve
 from sfm_front.photos.reader import PhotoReader
-from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.catalog import FeatureMemory
@@ -34,14 +32,13 @@ class Counts:
     reused: int = 0
 
 
-class Workbench(Closeable):
-    """Makes what a session would, each part once and when it is needed."""
+class Workbench:
+    """Makes what a session would, each part once; the parts end with it."""
 
     def __init__(self, settings: RunSettings) -> None:
         """Raises ConfigError if this worker would describe photos in another way."""
         self.settings = settings
         self.options = replace(settings.options, threads=1)
-        self._opened = ExitStack()
         device, _ = usable_device(self.options.device)
         descriptor, _ = resolve(
             self.options.global_descriptor,
@@ -56,13 +53,10 @@ class Workbench(Closeable):
             )
         reader = PhotoReader(max_image_size=self.options.max_image_size)
         sift = make_extractor(device, self.options.sift)
-        self.extraction = self._opened.enter_context(
-            FeatureExtraction(reader, sift, descriptor, num_threads=1)
-        )
+        self.extraction = FeatureExtraction(reader, sift, descriptor, num_threads=1)
         self.keys = extraction_settings(reader, sift.fingerprint, descriptor.fingerprint)
         self.cache = None if settings.cache is None else FeatureCache(settings.cache)
-        workers = self._opened.enter_context(WorkerPool(1))
-        self.matching = make_matching(self.options, device, workers)
+        self.matching = make_matching(self.options, device, WorkerPool(1))
         self.feature_keys: dict[int, str] = {}
         self.sent: dict[int, Features] = {}
         most = min(self.options.cache_bytes, _MAX_CACHE_BYTES)
@@ -79,9 +73,6 @@ class Workbench(Closeable):
             raise InputError(f"the features of image {image_id} are not in {self.settings.cache}")
         self.bytes_read += num_bytes(local.features)
         return local.features
-
-    def close(self) -> None:
-        self._opened.close()
 
 
 def extraction_settings(reader: PhotoReader, sift: str, descriptor: str) -> ExtractionSettings:

@@ -8,16 +8,16 @@ from threading import Lock
 from typing import Any
 
 from sfm_front.cluster.describing import describe
-from sfm_front.cluster.growing import grow
-from sfm_front.cluster.identity import identity, worker_name
+from sfm_front.cluster.growing import grow, join
+from sfm_front.cluster.identity import worker_name
 from sfm_front.cluster.matching import match
 from sfm_front.cluster.work import (
     DESCRIBE,
     GROW,
+    JOIN,
     MATCH,
     Answer,
     RunSettings,
-    WrongVersionError,
     pack,
     unpack,
 )
@@ -28,24 +28,22 @@ _DO: Mapping[str, Callable[[Workbench, Any, Counts], Any]] = {
     DESCRIBE: describe,
     MATCH: match,
     GROW: grow,
+    JOIN: join,
 }
 
 
 def run(kind: str, parcel: bytes) -> Answer:
-    """Raises WrongVersionError if this is not the coordinator's package."""
+    """On the thread that Dask calls."""
     settings: RunSettings
     settings, work = unpack(parcel)
-    if settings.identity != identity():
-        raise WrongVersionError(_address(), identity())
-    started, began, cpu = time.time(), time.perf_counter(), time.process_time()
+    began, cpu = time.perf_counter(), time.process_time()
     limit_this_thread()
     counts = Counts(bytes_in=len(parcel))
     with single_threaded_calls(opencv=True):
-        result = pack(_DO[kind](_workbench(settings), unpack(work), counts))
+        result = pack(_DO[kind](_workbench(settings), work, counts))
     return Answer(
         result=result,
         worker=worker_name(),
-        started=started,
         seconds=time.perf_counter() - began,
         cpu_seconds=time.process_time() - cpu,
         items=counts.items,
@@ -56,20 +54,13 @@ def run(kind: str, parcel: bytes) -> Answer:
 
 
 def _workbench(settings: RunSettings) -> Workbench:
-    """What the tasks of one run share; that of an earlier run is put away."""
+    """What the tasks of one run share. That of an earlier run goes once no task holds it: the last
+    one of a coordinator that died may still run."""
     global _current
     with _lock:
         if _current is None or _current.settings.run_id != settings.run_id:
-            if _current is not None:
-                _current.close()
             _current = Workbench(settings)
         return _current
-
-
-def _address() -> str:
-    from distributed import get_worker
-
-    return str(get_worker().address)
 
 
 _lock = Lock()

@@ -72,10 +72,6 @@ class WorkingFolder:
             return None
         return models
 
-    def remove(self) -> None:
-        """All is in the output itself."""
-        shutil.rmtree(self.path, ignore_errors=True)
-
 
 def key_of(work: GroupWork) -> str:
     """Equal for groups only if the same photos and matches are in them."""
@@ -89,6 +85,11 @@ def key_of(work: GroupWork) -> str:
     for camera in work.cameras.values():
         digest.update(str(camera.todict()).encode())
     return digest.hexdigest()
+
+
+def key_of_join(first: str, second: str) -> str:
+    """Of what is joined of two groups with these keys."""
+    return hashlib.blake2b(f"{first} and {second}".encode(), digest_size=16).hexdigest()
 
 
 def _write(path: Path, content: bytes) -> None:

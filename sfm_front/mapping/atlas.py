@@ -117,8 +117,8 @@ class Atlas:
             )
         self.initializer.go_on_after(max((model.model_id for model in self.models), default=0))
 
-    def take_model(self, reconstruction: pycolmap.Reconstruction, state: ModelState) -> None:
-        """Take in one that was grown elsewhere over the same photos; it gets an id of its own.
+    def take_model(self, reconstruction: pycolmap.Reconstruction, state: ModelState) -> int:
+        """Take in one that was grown elsewhere over the same photos; returns its id here.
 
         It is joined to others when they grow."""
         model = Model.restored(
@@ -131,6 +131,11 @@ class Atlas:
         )
         self.models.append(model)
         self.drop_covered()
+        return model.model_id
+
+    def remove(self, model_ids: Collection[int]) -> None:
+        """Others hold what these models hold."""
+        self.models = [model for model in self.models if model.model_id not in model_ids]
 
     @property
     def registered(self) -> set[int]:
@@ -171,12 +176,16 @@ class Atlas:
         Returns the image ids that are in some model now and were in none before.
         """
         before = self.registered
-        for model in self.models:
-            model.extend(image_id)
+        self.know(image_id)
         self.grow()
         if image_id in self.waiting:
             self._start_near(image_id)
         return sorted(self.registered - before)
+
+    def know(self, image_id: int) -> None:
+        """Make a photo of the view graph known to the models, without placing it."""
+        for model in self.models:
+            model.extend(image_id)
 
     def take_pairs(self, pairs: Sequence[PairGeometry]) -> None:
         """Take in pairs of photos that are there already, and place all that can be placed."""

@@ -44,12 +44,14 @@ class WorkerOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GroupOutcome:
-    """A group of ``photos``, of which ``registered`` found a place in its largest model.
+    """A group of ``photos``, of which ``registered`` found a place in its largest model; or two of
+    them, whose models were joined.
 
     ``seconds`` is 0 if its models were there from an earlier run.
     """
 
     photos: int
+    is_join: bool
     registered: int
     models: int
     seconds: float

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sfm_front.reports.camera_outcome import camera_warnings
+from sfm_front.reports.cluster_outcome import ClusterOutcome
 from sfm_front.reports.control_words import control_lines
 from sfm_front.reports.run_summary import AuditOutcome, RunSummary, Totals
 from sfm_front.reports.words import clock, counted
@@ -53,6 +54,8 @@ def closing_summary(
     for groups in summary.look_alikes:
         first, second = map(_named, groups)
         lines.append(f"taken for one place and taken apart, look-alikes: {first} and {second}")
+    if summary.cluster is not None:
+        lines += _cluster(summary.cluster)
     photos = max(totals.num_photos, 1)
     lines.append(
         f"it took {clock(totals.wall_seconds)}, {totals.wall_seconds / photos:.2f} s a photo"
@@ -66,6 +69,18 @@ def closing_summary(
     if with_stages:
         lines += _stages(totals)
     return "\n".join(lines)
+
+
+def _cluster(cluster: ClusterOutcome) -> list[str]:
+    """What is given up is named; report.html has the rest."""
+    busy = sum(worker.busy_seconds for worker in cluster.workers)
+    waiting = sum(worker.waiting_seconds for worker in cluster.workers)
+    lines = [
+        f"{counted(len(cluster.workers), 'worker')}: busy {clock(busy)}, waiting {clock(waiting)}"
+    ]
+    for task in cluster.failed[:20]:
+        lines.append(f"  given up: {task.kind} {_named(task.photos)}: {task.reason}")
+    return lines
 
 
 def _stages(totals: Totals) -> list[str]:

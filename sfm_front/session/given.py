@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import pycolmap
@@ -51,7 +51,8 @@ class GivenSession(Session):
         snapshot = read_snapshot(self.output / "sparse") if whole else None
         restore(self._parts, snapshot, self._announcer, grow=False)
 
-    def _map(self, _image_id: int, /) -> list[int]:
+    def _map(self, image_id: int, /) -> list[int]:
+        self._parts.atlas.know(image_id)
         return []  # it waits for the model of its group
 
     @property
@@ -106,6 +107,7 @@ class GivenSession(Session):
         if isinstance(view, Skipped):
             self.add_extracted(view)
             return None
+        self._announcer.path_of(photo.name)
         self._announcer.tell(PhotoDescribed(photo.name, len(photo.features), photo.seconds))
         clock = Stopwatch()
         with clock.stage("retrieve"):
@@ -141,15 +143,23 @@ class GivenSession(Session):
         if not self.has_models:
             self.database.remember(_STAGE, _GROWING)
 
-    def take_models(self, models: Iterable[tuple[pycolmap.Reconstruction, ModelState]]) -> None:
-        """Take in the models of a group."""
+    def take_models(
+        self,
+        models: Iterable[tuple[pycolmap.Reconstruction, ModelState]],
+        *,
+        in_place_of: Collection[int] = (),
+    ) -> list[int]:
+        """Take in the models of a group, or those that were joined of the ones with these ids;
+        returns their ids."""
+        atlas = self._parts.atlas
 
-        def take() -> None:
-            for reconstruction, state in models:
-                self._parts.atlas.take_model(reconstruction, state)
+        def take() -> list[int]:
+            atlas.remove(in_place_of)
+            return [atlas.take_model(reconstruction, state) for reconstruction, state in models]
 
-        self._placing_more(take)
+        taken = self._placing_more(take)
         self._write_snapshot_if_due()
+        return taken
 
     def end_growing(self) -> None:
         """All of them are there, and on the disk when this returns."""

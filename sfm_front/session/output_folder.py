@@ -103,6 +103,11 @@ def holds_session(output: Path) -> bool:
     return _is_own_file(output / _MARKER) and _is_own_file(output / DATABASE)
 
 
+def remove_working_folder(output: Path) -> None:
+    """What workers made is in the output itself."""
+    shutil.rmtree(output / WORKING_FOLDER, ignore_errors=True)
+
+
 def _clear(output: Path) -> None:
     """Remove what a session wrote; the marker stays, so that a second try may replace the rest."""
     for name in (*_MODELS, WORKING_FOLDER):

@@ -144,7 +144,9 @@ def restore(
             atlas.restore(snapshot.models)
             if snapshot.georeferencing is not None:
                 parts.georeferencing.restore(snapshot.georeferencing)
-        elif image_id > num_mapped and grow:
+        elif image_id > num_mapped and not grow:
+            atlas.know(image_id)
+        elif image_id > num_mapped:
             placed = atlas.add(image_id)
             parts.georeferencing.follow(atlas.models)
             announcer.tell_outcome(atlas, image_id, placed)

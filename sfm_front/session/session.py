@@ -33,7 +33,11 @@ from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.session.announcer import Announcer
 from sfm_front.session.control_points import ControlPoints
 from sfm_front.session.options import SessionOptions
-from sfm_front.session.output_folder import check_output_folder, open_output_folder
+from sfm_front.session.output_folder import (
+    check_output_folder,
+    open_output_folder,
+    remove_working_folder,
+)
 from sfm_front.session.pair_matching import candidate_outcomes
 from sfm_front.session.parts import open_parts, restore
 from sfm_front.session.photo_account import photo_added
@@ -278,6 +282,7 @@ class Session(Closeable):
         )
         write_report(self.output, summary)
         mark_finished(self.database)
+        remove_working_folder(self.output)
         totals = summary.totals
         self._announcer.tell(
             SessionEnded(True, totals.num_used, totals.num_registered, len(models))

@@ -25,7 +25,7 @@ PHOTOS = ("a", "b", "c", "d", "e", "f")
 # own, which looks at what comes out.
 NOT_RUN = re.compile(
     r"--watch$|--viewer|--web|--gps (positions|geo)|--gcp|--ground-truth|--camera-params"
-    r"|path/to/photos|^sfm-front view \S+$|^sfm-front export|^sfm-front --print"
+    r"|--cluster tcp|path/to/photos|^sfm-front view \S+$|^sfm-front export|^sfm-front --print"
 )
 
 

@@ -12,7 +12,7 @@ def report_of(
     num_photos: int, *, end_s: float = 1.0, group_size: int = 20, lost: int = 0
 ) -> dict[str, Any]:
     """As ``report.json`` has it: one worker; a photo is described in 0.5 s, matched in 0.25 s,
-    grown in 0.1 s, with 3, 1 and 0.5 MB; groups overlap by a quarter."""
+    grown in 0.1 s and joined in 0.04 s, with 3, 1, 0.5 and 0.5 MB; groups overlap by a quarter."""
     in_groups = num_photos * 5 // 4
     kinds = (("describe", num_photos, 0.5, 3), ("match", num_photos, 0.25, 1))
     tasks = [
@@ -27,7 +27,11 @@ def report_of(
             "bytes_in": round(megabytes * 1e6) * items,
             "bytes_out": 0,
         }
-        for kind, items, seconds, megabytes in (*kinds, ("grow", in_groups, 0.1, 0.5))
+        for kind, items, seconds, megabytes in (
+            *kinds,
+            ("grow", in_groups, 0.1, 0.5),
+            ("join", in_groups, 0.04, 0.5),
+        )
     ]
     group = {"registered": 9, "models": 1, "seconds": 1.0, "bytes_in": 0, "bytes_out": 0}
     return {
@@ -51,7 +55,11 @@ def report_of(
                     "bytes_out": 0,
                 }
             ],
-            "groups": [{**group, "photos": in_groups // 2}, {**group, "photos": in_groups // 2}],
+            "groups": [
+                {**group, "photos": in_groups // 2, "is_join": False},
+                {**group, "photos": in_groups // 2, "is_join": False},
+                {**group, "photos": in_groups, "is_join": True},
+            ],
             "lost": lost,
             "failed": [],
         },

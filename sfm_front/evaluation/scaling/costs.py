@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sfm_front.cluster.work import DESCRIBE, GROW, MATCH
+from sfm_front.cluster.work import DESCRIBE, GROW, JOIN, MATCH
 from sfm_front.errors import InputError
 from sfm_front.reports.cluster_outcome import ClusterOutcome, TaskKindOutcome, cluster_of_row
 
@@ -88,7 +88,7 @@ class SerialCost:
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """``describe``, ``match`` and ``grow`` per photo of a task; ``end``: after all tasks.
+    """``describe``, ``match``, ``grow`` and ``join`` per photo of a task; ``end``: after all tasks.
 
     ``group`` and ``take`` count photos of groups, which overlap by ``overlap`` of their size.
     """
@@ -96,6 +96,7 @@ class Costs:
     describe: TaskCost
     match: TaskCost
     grow: TaskCost
+    join: TaskCost
     retrieve: SerialCost
     store: SerialCost
     cut: SerialCost
@@ -111,7 +112,8 @@ class Costs:
         """Of runs with groups of one size. Tasks cost the mean of all; the coordinator's work is
         fitted as a power of the number of photos, in proportion where all had as many.
 
-        Raises InputError without runs, for groups of several sizes, and where no group was grown.
+        Raises InputError without runs, for groups of several sizes, and where no groups were grown
+        or joined by workers.
         """
         if not runs:
             raise InputError("costs need the report of a run at least")
@@ -128,11 +130,14 @@ class Costs:
         def stage(name: str) -> SerialCost:
             return serial(lambda run: run.outcome.serial_seconds.get(name, 0.0))
 
-        in_groups = sum(group.photos for run in runs for group in run.outcome.groups)
+        in_groups = sum(
+            group.photos for run in runs for group in run.outcome.groups if not group.is_join
+        )
         return cls(
             describe=_task_cost(runs, DESCRIBE),
             match=_task_cost(runs, MATCH),
             grow=_task_cost(runs, GROW),
+            join=_task_cost(runs, JOIN),
             retrieve=stage(RETRIEVE),
             store=stage(STORE),
             cut=stage(CUT),
@@ -149,7 +154,10 @@ def _task_cost(runs: Sequence[ClusterRun], kind: str) -> TaskCost:
     tasks = [task for run in runs if (task := run.task(kind)) is not None]
     items = sum(task.items for task in tasks)
     if items == 0:
-        raise InputError(f"no task of the kind {kind!r} in these reports")
+        raise InputError(
+            f"no task of the kind {kind!r} in these reports. Give runs with smaller groups, of "
+            "which more than two are joined."
+        )
     return TaskCost(
         sum(task.cpu_seconds for task in tasks) / items,
         sum(task.bytes_in + task.bytes_out for task in tasks) / items,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from sfm_front.cluster.groups import num_parts
+from sfm_front.cluster.join_plan import LEFT
 from sfm_front.cluster.photo_stage import batch_size, most_ahead
 from sfm_front.cluster.task_queue import most_under_way
 from sfm_front.errors import ConfigError, DependencyError
@@ -78,11 +78,14 @@ def simulate(costs: Costs, num_photos: int, shape: ClusterShape) -> Prediction:
 
 @dataclass(slots=True, eq=False)
 class _Batch:
-    """Photos of one task, and whether it has ended."""
+    """Photos of one task, and whether it has ended. A group's may be joined to another's: that task
+    waits for both its parts."""
 
-    num_photos: int
+    num_photos: float
     kind: TaskCost
     is_done: bool = False
+    union: _Batch | None = None
+    num_parts_left: int = 2
 
 
 @dataclass(eq=False)
@@ -129,11 +132,11 @@ class _Run:
                 ahead = sum(b.num_photos for b in (*describing, *matching)) + to_match
                 if to_match >= size or (to_match and not left and not describing):
                     batch = _Batch(min(size, to_match), costs.match)
-                    to_match -= batch.num_photos
+                    to_match -= min(size, to_match)
                     matching.append(batch)
                 elif left and ahead < most_ahead(threads, size):
                     batch = _Batch(min(size, left), costs.describe)
-                    left -= batch.num_photos
+                    left -= min(size, left)
                     describing.append(batch)
                 else:
                     break
@@ -142,40 +145,64 @@ class _Run:
                 return
             yield from self._wait()
             while describing and describing[0].is_done:
-                come = describing.popleft().num_photos
+                come = round(describing.popleft().num_photos)
                 yield from self._compute(costs.retrieve.between(described, described + come))
                 described, to_match = described + come, to_match + come
             while matching and matching[0].is_done:
-                come = matching.popleft().num_photos
+                come = round(matching.popleft().num_photos)
                 yield from self._compute(costs.store.between(stored, stored + come))
                 stored += come
 
     def _group_stage(self) -> Steps:
-        """As ``cluster/group_stage.py``: groups are read, grown, kept and taken one by one."""
+        """As ``cluster/group_stage.py``: groups are grown, and joined two at a time."""
         costs, threads = self.costs, self.shape.num_workers
         yield from self._compute(costs.cut.total(self.num_photos))
-        number = num_parts(self.num_photos, costs.group_size, threads)
-        photos = self.num_photos / number
-        size = math.ceil(photos * (1 + costs.overlap)) if number > 1 else self.num_photos
-        left, read, taken = number, 0.0, 0.0
-        while left or self._under_way:
-            while left and self._under_way < most_under_way(threads):
-                yield from self._compute(costs.group.between(read, read + photos) / 2)
-                left, read = left - 1, read + photos
-                self._submit(_Batch(size, costs.grow))
-            yield from self._wait()
-            yield from self._compute(costs.group.between(taken, taken + photos) / 2)
-            yield from self._compute(costs.take.between(taken, taken + photos))
-            taken += photos
+        ready = deque(self._plan_groups(num_parts(self.num_photos, costs.group_size, threads)))
+        read, taken = 0.0, 0.0
+        while ready or self._under_way:
+            while ready and self._under_way < most_under_way(threads):
+                batch = ready.popleft()
+                yield from self._compute(costs.group.between(read, read + batch.num_photos) / 2)
+                read += batch.num_photos
+                self._submit(batch)
+            batch = yield from self._wait()
+            come = batch.num_photos
+            yield from self._compute(costs.group.between(taken, taken + come) / 2)
+            yield from self._compute(costs.take.between(taken, taken + come))
+            taken += come
+            union = batch.union
+            if union is not None:
+                union.num_parts_left -= 1
+                if union.num_parts_left == 0:
+                    ready.appendleft(union)
+
+    def _plan_groups(self, number: int) -> list[_Batch]:
+        """Groups of one size, and in ``union`` what they are joined to: in rounds of pairs, as
+        ``cluster/join_plan.py`` does it, until two are left."""
+        size = self.num_photos / number * (1 + self.costs.overlap if number > 1 else 1)
+        groups = [_Batch(size, self.costs.grow) for _ in range(number)]
+        active = list(groups)
+        while len(active) > LEFT:
+            num_joins = min(len(active) // 2, len(active) - LEFT)
+            unions = []
+            for first, second in zip(
+                active[: 2 * num_joins : 2], active[1 : 2 * num_joins : 2], strict=True
+            ):
+                union = _Batch(first.num_photos + second.num_photos, self.costs.join)
+                first.union = second.union = union
+                unions.append(union)
+            active = [*active[2 * num_joins :], *unions]
+        return groups
 
     def _submit(self, batch: _Batch) -> None:
         self._under_way += 1
         self.env.process(self._task(batch))
 
-    def _wait(self) -> Steps:
-        batch = yield self._ended.get()
+    def _wait(self) -> Generator[simpy.Event, Any, _Batch]:
+        batch: _Batch = yield self._ended.get()
         batch.is_done = True
         self._under_way -= 1
+        return batch
 
     def _task(self, batch: _Batch) -> Steps:
         with self._workers.request() as worker:

@@ -19,6 +19,7 @@ from sfm_front.reports.html.plan import plan
 from sfm_front.reports.html.stage_times import stage_times
 from sfm_front.reports.html.unplaced import unplaced
 from sfm_front.reports.html.verdict import all_lights, as_list
+from sfm_front.reports.html.workers import workers
 from sfm_front.reports.lights import Light
 from sfm_front.reports.verdict import verdict
 from sfm_front.reports.words import clock
@@ -52,6 +53,7 @@ def as_page(material: Material) -> str:
         cameras(material, results),
         _matches(material),
         _time(material),
+        workers(material),
         doubts(material),
         photo_table(material),
     ]

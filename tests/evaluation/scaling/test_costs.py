@@ -43,6 +43,7 @@ def test_tasks_cost_what_they_took_per_photo():
     assert costs.describe.seconds == pytest.approx(0.5)
     assert costs.match.seconds == pytest.approx(0.25)
     assert costs.grow.seconds == pytest.approx(0.1)
+    assert costs.join.seconds == pytest.approx(0.04)
     assert costs.describe.num_bytes == pytest.approx(3e6)
     assert costs.overlap == pytest.approx(0.25)
 

@@ -8,7 +8,7 @@ import pytest
 from helpers.cluster_reports import measured
 
 from sfm_front.errors import ConfigError
-from sfm_front.evaluation.scaling.costs import Costs, SerialCost
+from sfm_front.evaluation.scaling.costs import Costs, SerialCost, TaskCost
 from sfm_front.evaluation.scaling.simulation import ClusterShape, simulate
 
 FAST_WAY = 1e15
@@ -17,9 +17,10 @@ NOTHING = SerialCost(0.0)
 
 @pytest.fixture
 def costs() -> Costs:
-    """Of workers alone: a photo takes 0.5 s, 0.25 s and 0.125 s of them, with the overlap."""
+    """Of workers alone: a photo takes 0.5 s, 0.25 s and 0.125 s of them, with the overlap. Joins
+    cost nothing."""
     free = dict.fromkeys(("retrieve", "store", "cut", "group", "take", "end"), NOTHING)
-    return replace(Costs.of([measured(40)]), start_seconds=0.0, **free)
+    return replace(Costs.of([measured(40)]), start_seconds=0.0, join=TaskCost(0, 0), **free)
 
 
 def shape(num_workers: int, **others: object) -> ClusterShape:
@@ -40,6 +41,16 @@ def test_fewer_groups_than_workers_leave_some_idle(costs):
     # Forty photos in two groups: two workers grow, and six wait.
     two, eight = (simulate(costs, 40, shape(n)).groups_s for n in (2, 8))
     assert eight == pytest.approx(two)
+
+
+def test_groups_are_joined_in_rounds_until_two_are_left(costs):
+    # Sixteen groups of 20 and their overlap, three rounds that hold all of them.
+    joined = replace(costs, join=TaskCost(0.04, 0))
+    more_s = simulate(joined, 320, shape(1)).wall_s - simulate(costs, 320, shape(1)).wall_s
+    assert more_s == pytest.approx(3 * 320 * 1.25 * 0.04)
+    # A join waits for its parts: the last ones are for two workers, whatever there are.
+    many = simulate(joined, 320, shape(64))
+    assert many.groups_s >= (20 * 0.1 + (40 + 80 + 160) * 0.04) * 1.25
 
 
 def test_the_coordinator_alone_makes_the_end(costs):
