@@ -11,7 +11,7 @@ from sfm_front.cluster.features import FeatureStore
 from sfm_front.cluster.figures import Figures
 from sfm_front.cluster.group_stage import GroupStage
 from sfm_front.cluster.options import ClusterOptions
-from sfm_front.cluster.photo_stage import PhotoStage
+from sfm_front.cluster.photo_stage import PhotoStage, batch_size
 from sfm_front.cluster.storage_probe import all_see_photo, all_see_token
 from sfm_front.cluster.task_queue import TaskQueue
 from sfm_front.cluster.work import DESCRIBE, GROW, JOIN, MATCH, RunSettings
@@ -91,7 +91,7 @@ class Coordinator:
         for image_id, digest in session.restored():
             features.know(image_id, digest)
         self._queue = TaskQueue(cluster, settings, options.attempts, self._figures)
-        self._batch_size = _batch_size(len(photos), self._queue.num_threads, options.batch_size)
+        self._batch_size = batch_size(len(photos), self._queue.num_threads, options.batch_size)
         self._photos = PhotoStage(
             session, self._queue, features, photos, self._batch_size, self._tell
         )
@@ -152,8 +152,3 @@ class Coordinator:
                 return None
             left += number * (seconds or 0.0)
         return left / self._queue.num_threads
-
-
-def _batch_size(num_photos: int, num_threads: int, most: int) -> int:
-    """Small enough that each worker gets several, large enough to be worth the way."""
-    return max(min(2, most), min(most, -(-num_photos // (4 * num_threads))))

@@ -30,7 +30,7 @@ def cut(
     """
     groups: list[set[int]] = []
     for component in _components(graph, set(photos)):
-        number = _num_parts(len(component), group_size, num_workers)
+        number = num_parts(len(component), group_size, num_workers)
         groups += _parts(graph, sorted(component), number)
     widened = [sorted(group | _beside(graph, group, overlap)) for group in groups]
     return sorted(widened, key=lambda group: (-len(group), group))
@@ -46,7 +46,8 @@ def _components(graph: ViewGraph, photos: set[int]) -> list[set[int]]:
     return found
 
 
-def _num_parts(num_photos: int, group_size: int, num_workers: int) -> int:
+def num_parts(num_photos: int, group_size: int, num_workers: int) -> int:
+    """Groups that so many linked photos are cut into."""
     number = -(-num_photos // group_size)
     if 1 < number < _FEW_ROUNDS * num_workers:
         even = -(-number // num_workers) * num_workers

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from sfm_front.mapping.view_graph import ViewGraph
 
 # So many are left to the coordinator, which has the whole to adjust anyway.
-_LEFT = 2
+LEFT = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +27,11 @@ def plan_joins(graph: ViewGraph, groups: Sequence[Sequence[int]]) -> list[Node]:
     nodes = [Node(tuple(group)) for group in groups]
     links = _links(graph, groups)
     active = set(range(len(nodes)))
-    while len(active) > _LEFT:
+    while len(active) > LEFT:
         free = set(active)
         made: list[tuple[int, int]] = []
         for (first, second), _ in sorted(links.items(), key=lambda link: (-link[1], link[0])):
-            if len(active) - len(made) <= _LEFT:
+            if len(active) - len(made) <= LEFT:
                 break
             if first in free and second in free:
                 free -= {first, second}

@@ -23,6 +23,16 @@ from sfm_front.session.given import Arrival, GivenSession
 from sfm_front.types import ExtractedPhoto, PhotoPath, Skipped, SkipReason
 
 
+def batch_size(num_photos: int, num_threads: int, most: int) -> int:
+    """Photos of a task: few enough that each worker gets several, enough to be worth the way."""
+    return max(min(2, most), min(most, -(-num_photos // (4 * num_threads))))
+
+
+def most_ahead(num_threads: int, batch_size: int) -> int:
+    """Photos that may be under way at once."""
+    return 6 * num_threads * batch_size
+
+
 class PhotoStage:
     """Takes photos in as a session does, several batches ahead of what is matched."""
 
@@ -82,7 +92,7 @@ class PhotoStage:
     def _is_far_ahead(self) -> bool:
         """Features of photos that have not entered are held in memory."""
         ahead = len(self._describing) + len(self._to_match) + len(self._matching)
-        return ahead >= 6 * self._queue.num_threads * self._batch_size
+        return ahead >= most_ahead(self._queue.num_threads, self._batch_size)
 
     # Describing
 

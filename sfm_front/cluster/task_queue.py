@@ -46,6 +46,11 @@ class Task:
     held: list[Any] = field(default_factory=list)
 
 
+def most_under_way(num_threads: int) -> int:
+    """Tasks handed out at once: each worker has one, and the next one is there when that ends."""
+    return 2 * num_threads
+
+
 class TaskQueue(Closeable):
     """Hands tasks to the workers, and their results to who asked, on the thread that waits."""
 
@@ -75,8 +80,8 @@ class TaskQueue(Closeable):
 
     @property
     def is_full(self) -> bool:
-        """Whether each worker has a task, and the next one is there when that ends."""
-        return len(self._under_way) >= 2 * self.num_threads
+        """Whether no more are handed out until some have ended."""
+        return len(self._under_way) >= most_under_way(self.num_threads)
 
     def submit(self, task: Task) -> None:
         """Hand it out."""

@@ -104,6 +104,8 @@ class _Comparison:
         ]
         self._centers = np.array([posed.center for posed in self._posed])
         self._bounds: dict[tuple[int, int], IndexArray] = {}
+        # For ``_split``: of many pairs, sorting would take most of the time.
+        self._is_marked = np.zeros(len(self.covisibility.points), np.bool_)
 
     def conflict(self, beyond: BoolArray) -> float:
         """Cells in which the photos ``beyond`` (N,) or the others miss what both should see, of the
@@ -142,21 +144,30 @@ class _Comparison:
 
     def _angle_deg(self, pair: tuple[int, int]) -> float:
         """Median angle between the directions in which two photos see the points they share."""
-        first, second = (self.covisibility.observed[photo] for photo in pair)
-        points = self.covisibility.points[np.intersect1d(first, second, assume_unique=True)]
+        _, _, shared = self._split(pair)
+        points = self.covisibility.points[shared]
         rays1, rays2 = (points - self._centers[photo] for photo in pair)
         cosine = np.einsum("nd,nd->n", rays1, rays2)
         cosine /= np.linalg.norm(rays1, axis=1) * np.linalg.norm(rays2, axis=1)
         return float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
 
+    def _split(self, pair: tuple[int, int]) -> tuple[IndexArray, IndexArray, IndexArray]:
+        """Points that the first photo alone observes, the second alone, and both."""
+        first, second = (self.covisibility.observed[photo] for photo in pair)
+        self._is_marked[second] = True
+        both = self._is_marked[first]
+        self._is_marked[second] = False
+        self._is_marked[first] = True
+        of_second = second[~self._is_marked[second]]
+        self._is_marked[first] = False
+        return first[~both], of_second, first[both]
+
     def _bound(self, pair: tuple[int, int]) -> IndexArray:
         """At least as many cells in which things are missing, and no more that are the same, than
         in any two parts."""
         if pair not in self._bounds:
-            first, second = (self.covisibility.observed[photo] for photo in pair)
-            shared = np.intersect1d(first, second, assume_unique=True)
-            unique = np.setdiff1d(first, shared, True), np.setdiff1d(second, shared, True)
-            self._bounds[pair] = self._cells(pair, unique, shared)
+            of_first, of_second, shared = self._split(pair)
+            self._bounds[pair] = self._cells(pair, (of_first, of_second), shared)
             self._bounds[pair[::-1]] = self._bounds[pair][:, ::-1]
         return self._bounds[pair]
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import pytest
+from helpers.live_session import orbit, photos_of, run_session
 from helpers.report_making import finished_output
 
 from sfm_front.cli.main import main
@@ -15,6 +18,15 @@ def test_the_page_is_made_anew(tmp_path, capsys):
     said = capsys.readouterr().out.splitlines()
     assert said[0] == f"wrote {output / 'report.html'}: open it in a browser"
     assert (output / "report.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_of_a_session_that_was_stopped_there_is_one_too(tmp_path, capsys):
+    photos = islice(photos_of(orbit(24), tmp_path / "photos"), 4)
+    output = run_session(tmp_path / "out", photos, finish=False)
+    assert main(["report", str(output)]) == 0
+    assert "report.html" in capsys.readouterr().out
+    page = (output / "report.html").read_text(encoding="utf-8")
+    assert "before its end: the same command goes on" in page
 
 
 @pytest.mark.parametrize("arguments", [[], ["--photos", "nowhere"]])

@@ -1,0 +1,1 @@
+"""How long a cluster would take, by a discrete simulation over tasks that were measured."""
