@@ -22,7 +22,7 @@ def threads() -> Iterator[Cluster]:
     """What is patched here is patched there."""
     distributed = pytest.importorskip("distributed")
     with distributed.Client(
-        processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None
+        processes=False, n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0"
     ) as client:
         cluster = Cluster(client, "inproc", print)
         cluster.require_workers()
