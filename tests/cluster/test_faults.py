@@ -102,7 +102,7 @@ def test_a_coordinator_that_dies_is_gone_on_with(
         entered = 21 - by_kind[MATCH].items
         assert entered == last[-1].num_matched
         assert by_kind[DESCRIBE].items == 21 - entered
-        assert by_kind[DESCRIBE].reused >= last[-1].num_described - entered > 0
+        assert by_kind[DESCRIBE].reused >= last[-1].num_described - entered
     else:
         assert set(by_kind) == {GROW}
         assert by_kind[GROW].count == 1
