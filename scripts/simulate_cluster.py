@@ -38,6 +38,14 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
         help="runs on this machine's cores with other numbers of workers: how well it is foretold",
     )
     parser.add_argument(
+        "--end",
+        type=_photos_and_seconds,
+        nargs="+",
+        default=[],
+        metavar="PHOTOS=SECONDS",
+        help="what the end of larger sessions took, as benchmark_stream.py says",
+    )
+    parser.add_argument(
         "--photos", type=int, nargs="+", default=[1000, 10_000, 100_000], metavar="N"
     )
     parser.add_argument(
@@ -51,8 +59,19 @@ def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
+def _photos_and_seconds(text: str) -> tuple[int, float]:
+    photos, _, seconds = text.partition("=")
+    try:
+        found = int(photos), float(seconds)
+    except ValueError:
+        found = 0, 0.0
+    if found[0] < 1 or not 0 < found[1] < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not PHOTOS=SECONDS, both above 0")
+    return found
+
+
 def run(args: argparse.Namespace) -> None:
-    costs = Costs.of([ClusterRun.read(report) for report in args.reports])
+    costs = Costs.of([ClusterRun.read(report) for report in args.reports], dict(args.end))
     cores = available_cores()
     checked = [
         (

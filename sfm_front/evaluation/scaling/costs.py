@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -108,9 +108,12 @@ class Costs:
     overlap: float
 
     @classmethod
-    def of(cls, runs: Sequence[ClusterRun]) -> Costs:
+    def of(cls, runs: Sequence[ClusterRun], ends: Mapping[int, float] | None = None) -> Costs:
         """Of runs with groups of one size. Tasks cost the mean of all; the coordinator's work is
         fitted as a power of the number of photos, in proportion where all had as many.
+
+        ``ends``: photos → seconds of the end of other sessions, larger ones say, which are fitted
+        too.
 
         Raises InputError without runs, for groups of several sizes, and where no groups were grown
         or joined by workers.
@@ -124,11 +127,11 @@ class Costs:
                 "photo costs depends on it. Give runs with the same --group-size."
             )
 
-        def serial(seconds: Callable[[ClusterRun], float]) -> SerialCost:
-            return _fitted([(run.num_photos, seconds(run)) for run in runs])
-
         def stage(name: str) -> SerialCost:
-            return serial(lambda run: run.outcome.serial_seconds.get(name, 0.0))
+            seconds = [run.outcome.serial_seconds.get(name, 0.0) for run in runs]
+            return _fitted([(run.num_photos, s) for run, s in zip(runs, seconds, strict=True)])
+
+        measured_ends = [(run.num_photos, run.end_seconds) for run in runs]
 
         in_groups = sum(
             group.photos for run in runs for group in run.outcome.groups if not group.is_join
@@ -143,7 +146,7 @@ class Costs:
             cut=stage(CUT),
             group=stage(GROUP),
             take=stage(TAKE),
-            end=serial(lambda run: run.end_seconds),
+            end=_fitted([*measured_ends, *(ends or {}).items()]),
             start_seconds=float(np.mean([run.start_seconds for run in runs])),
             group_size=sizes.pop(),
             overlap=max(0.0, in_groups / sum(run.num_photos for run in runs) - 1),

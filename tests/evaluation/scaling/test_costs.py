@@ -62,6 +62,11 @@ def test_of_two_sizes_it_follows_a_power():
     assert costs.end.total(0) == 0
 
 
+def test_ends_of_larger_sessions_count_too():
+    costs = Costs.of([measured(40, end_s=2.0)], {160: 16.0})
+    assert costs.end.total(640) == pytest.approx(128.0)
+
+
 def test_groups_of_several_sizes_cannot_be_compared():
     with pytest.raises(InputError, match="20, 30 photos"):
         Costs.of([measured(40, group_size=20), measured(40, group_size=30)])

@@ -21,7 +21,7 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
 def test_tables_chart_and_figures(tmp_path: Path) -> None:
     report = tmp_path / "report.json"
     report.write_text(json.dumps(report_of(40)))
-    sizes = ["--photos", 100, 1000, "--workers", 1, 4]
+    sizes = ["--end", "4000=500", "--photos", 100, 1000, "--workers", 1, 4]
     files = ["--chart", tmp_path / "curves.png", "--json", tmp_path / "figures.json"]
     ended = run(report, "--against", report, *sizes, *files)
     assert ended.returncode == 0, ended.stderr
@@ -43,3 +43,7 @@ def test_a_mistake_is_one_line(tmp_path: Path) -> None:
     assert ended.returncode == 2
     assert ended.stderr.startswith("simulate_cluster: ")
     assert ended.stderr.count("\n") == 1
+    assert (
+        "--end: '0=3' is not PHOTOS=SECONDS"
+        in run(tmp_path / "nowhere.json", "--end", "0=3").stderr
+    )
