@@ -16,6 +16,7 @@ from PIL import Image
 from sfm_front.cli import reconstruct, retrieve
 from sfm_front.cli.main import main
 from sfm_front.cli.reconstruct_arguments import session_options
+from sfm_front.cluster.options import ClusterOptions
 from sfm_front.georeference.control.options import ControlOptions
 from sfm_front.search.folder_search import SearchOptions
 from sfm_front.session.options import SessionOptions, available_cores
@@ -92,6 +93,7 @@ DEFAULTS_OF = {
         "--num-matched": SESSION.pair_matching.num_matched,
         "--snapshot-seconds": f"{SESSION.snapshot_seconds:g}",
         "--cache-mb": "a quarter of the machine's memory, at most 2048",
+        "--group-size": ClusterOptions(address="local:1").group_size,
     },
     retrieve: DEFAULTS | {"--method": SearchOptions().method},
 }
