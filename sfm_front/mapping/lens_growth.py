@@ -167,6 +167,8 @@ def _most_promising(
     for lens in lenses:
         fall = 1 - (1 - evidence.explained(lens.params)) / unexplained
         beyond = fall - options.min_gain * _steps(camera, lens)
+        if fall < _asked(camera, lens, options):
+            continue
         if beyond > most and evidence.focal_sigma(lens.params) <= options.max_focal_sigma:
             best, most = lens, beyond
     return best
@@ -188,13 +190,18 @@ def _adjusted(
 
 
 def _steps(camera: pycolmap.Camera, lens: Lens) -> int:
-    """How far a lens is from the one that a camera has. The principal point counts twice: where it
-    is wrong, turned photos make up for it, and a few wrong matches move it (TUNING: lens-gain).
-    """
+    """How far a lens is from the one that a camera has."""
     up = 0
     if lens.model != camera.model_name:
         up = LADDER.index(lens.model) - LADDER.index(camera.model_name)
-    return up + 2 * lens.moves_principal_point
+    return up + lens.moves_principal_point
+
+
+def _asked(camera: pycolmap.Camera, lens: Lens, options: CalibrationOptions) -> float:
+    """By what share the median error must fall. A principal point must bring as much as two steps
+    even alone: turned photos make up for a wrong one, and a few wrong matches move it
+    (TUNING: lens-gain)."""
+    return options.min_gain * max(_steps(camera, lens), 2 * lens.moves_principal_point)
 
 
 def _is_borne_out(
@@ -203,7 +210,7 @@ def _is_borne_out(
     plan: Mapping[int, Lens],
     options: CalibrationOptions,
 ) -> bool:
-    asked = options.min_gain * min(_steps(before.camera(i), lens) for i, lens in plan.items())
+    asked = min(_asked(before.camera(i), lens, options) for i, lens in plan.items())
     seen_by = set(plan) if len(photos_by_camera(before)) > len(plan) else None
     if median_error(tried, seen_by) > (1 - asked) * median_error(before, seen_by):
         return False

@@ -18,6 +18,8 @@ HUGE = 1000
 
 # Of those, the points that each photo keeps (TUNING: thinned).
 _POINTS_PER_PHOTO = 200
+# Reprojection error of an observation from which a point that was adjusted by itself has no place.
+_LOST_PX = 50.0
 # Points that are adjusted at a time, each by itself: so many take little memory.
 _AT_A_TIME = 50_000
 
@@ -51,6 +53,8 @@ def adjust_thinned(
     del thinned
     for start in range(0, len(others), _AT_A_TIME):
         _adjust_points(reconstruction, others[start : start + _AT_A_TIME], adjustment)
+    # From where they were before the photos moved, some do not find back.
+    pycolmap.ObservationManager(reconstruction).filter_points3D(_LOST_PX, 0.0, set(others))
 
 
 def chosen_points(reconstruction: pycolmap.Reconstruction, per_photo: int) -> set[int]:

@@ -99,6 +99,19 @@ def test_the_other_points_are_where_the_photos_see_them(model, displaced):
 
 
 @pytest.mark.usefixtures("huge")
+def test_a_point_that_does_not_find_back_is_dropped(model):
+    lost = min(set(model.point3D_ids()) - chosen_points(model, 60))
+    image = model.image(model.point3D(lost).track.elements[0].image_id)
+    # As far behind its photos as no step brings back.
+    model.point3D(lost).xyz = image.projection_center() - 1e6 * image.viewing_direction()
+    before = model.num_points3D()
+    adjust_thinned(model, pycolmap.BundleAdjustmentOptions(print_summary=False), lambda _: None)
+    model.update_point_3d_errors()
+    assert model.num_points3D() in (before - 1, before)
+    assert max(point.error for point in model.points3D.values()) < thinned_adjustment._LOST_PX
+
+
+@pytest.mark.usefixtures("huge")
 def test_what_adjusts_it_may_move_it_as_a_whole(model):
     def move(thinned: pycolmap.Reconstruction) -> None:
         assert thinned.num_points3D() < model.num_points3D()
