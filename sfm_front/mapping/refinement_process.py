@@ -18,10 +18,6 @@ from dataclasses import dataclass
 import pycolmap
 
 from sfm_front.mapping.bundle_adjustment import solved_directly
-from sfm_front.runtime.priority import let_others_first
-
-# Photos come first.
-_NICE = 5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +74,10 @@ def main(folder: str) -> None:
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     # Whatever libraries print is not an answer.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    let_others_first(_NICE)
+    # Photos come first, but only where the system weighs processes one by one: if it waits longer,
+    # photos are placed in a model that has drifted, and one may be lost.
+    if hasattr(os, "nice"):
+        os.nice(5)
     for line in sys.stdin:
         try:
             adjust(AdjustmentRequest(**json.loads(line)))
