@@ -148,6 +148,12 @@ class Features:
     def __len__(self) -> int:
         return len(self.keypoints)
 
+    @property
+    def num_bytes(self) -> int:
+        """In memory, and nearly so on disk."""
+        parts: tuple[NDArray[Any], ...] = (self.keypoints, self.descriptors, self.colors)
+        return sum(part.nbytes for part in parts)
+
     def largest(self, count: int) -> Features:
         """Its first ``count`` features, without a copy."""
         return Features(self.keypoints[:count], self.descriptors[:count], self.colors[:count])
@@ -343,6 +349,18 @@ class ModelSummary:
     num_points: int
     mean_reprojection_error_px: float
     mean_track_length: float
+
+    @classmethod
+    def of(cls, reconstruction: pycolmap.Reconstruction, path: Path) -> ModelSummary:
+        """Of a model as it is now."""
+        return cls(
+            path=path,
+            reconstruction=reconstruction,
+            num_registered=int(reconstruction.num_reg_images()),
+            num_points=int(reconstruction.num_points3D()),
+            mean_reprojection_error_px=float(reconstruction.compute_mean_reprojection_error()),
+            mean_track_length=float(reconstruction.compute_mean_track_length()),
+        )
 
     @property
     def path_in_output(self) -> str:

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from sfm_front.cluster.work import Described, DescribedPhoto, PhotoFile
-from sfm_front.cluster.workbench import Counts, Workbench, num_bytes
+from sfm_front.cluster.workbench import Counts, Workbench
 from sfm_front.features.feature_cache import CachedFeatures
 from sfm_front.photos.reader import file_digest
 from sfm_front.types import PhotoPath, Skipped
@@ -49,5 +49,5 @@ def _described(bench: Workbench, photo: PhotoPath, counts: Counts) -> Described:
     keys = bench.keys.keys(made.digest)
     cache.save_vector(keys.vectors[0], made.global_vector)
     cache.save_local(keys.features, local)
-    counts.bytes_out += num_bytes(made.features) + made.global_vector.nbytes
+    counts.bytes_out += made.features.num_bytes + made.global_vector.nbytes
     return DescribedPhoto(photo.name, made.digest, made.seconds, reused=False)

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from sfm_front.cluster.work import GroupPhoto, GroupWork
+from sfm_front.matching.nearest_neighbors import NO_MATCHES
 from sfm_front.session.given import GivenSession
-
-_NO_MATCHES = np.zeros((0, 2), np.uint32)
 
 
 class GroupInputs:
@@ -34,7 +33,7 @@ class GroupInputs:
         )
         pairs = {
             image_id: tuple(
-                replace(pair, matches=_NO_MATCHES)  # a view graph has no use for others
+                replace(pair, matches=NO_MATCHES)  # a view graph has no use for others
                 for pair in session.database.pairs(image_id)
                 if pair.image_id2 in members
             )

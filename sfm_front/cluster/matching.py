@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from sfm_front.cluster.work import MatchedPhoto, MatchWork, Query
 from sfm_front.cluster.workbench import Counts, Workbench
+from sfm_front.matching.nearest_neighbors import NO_MATCHES
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.types import View
-
-_NO_MATCHES = np.zeros((0, 2), np.uint32)
 
 
 def match(bench: Workbench, work: MatchWork, counts: Counts) -> list[MatchedPhoto]:
@@ -43,7 +40,7 @@ def _match(bench: Workbench, query: Query, views: Mapping[int, View]) -> Matched
     )
     return MatchedPhoto(
         query.image_id,
-        tuple(replace(candidate, matches=_NO_MATCHES) for candidate in ranked),
+        tuple(replace(candidate, matches=NO_MATCHES) for candidate in ranked),
         tuple(pairs),
         rejected,
         clock.seconds,

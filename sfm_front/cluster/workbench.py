@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from sfm_front.cluster.work import RunSettings
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.features.extraction import FeatureExtraction, make_extractor
@@ -71,7 +69,7 @@ class Workbench:
         local = None if cache is None else cache.load_local(self.feature_keys[image_id])
         if local is None:
             raise InputError(f"the features of image {image_id} are not in {self.settings.cache}")
-        self.bytes_read += num_bytes(local.features)
+        self.bytes_read += local.features.num_bytes
         return local.features
 
 
@@ -79,9 +77,3 @@ def extraction_settings(reader: PhotoReader, sift: str, descriptor: str) -> Extr
     """By which coordinator and workers find features of the same photo. ``sift`` and
     ``descriptor``: their fingerprints."""
     return ExtractionSettings(reader.max_image_size, reader.min_image_size, sift, (descriptor,))
-
-
-def num_bytes(features: Features) -> int:
-    """In memory, and nearly so on disk."""
-    parts: tuple[np.ndarray, ...] = (features.keypoints, features.descriptors, features.colors)
-    return sum(part.nbytes for part in parts)

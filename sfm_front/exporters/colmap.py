@@ -99,16 +99,7 @@ def _export(
         if point_clouds:
             reconstruction.export_PLY(model / POINT_CLOUD)
         check_written(reconstruction, model)
-        summaries.append(
-            ModelSummary(
-                path=folder / str(number),
-                reconstruction=reconstruction,
-                num_registered=int(reconstruction.num_reg_images()),
-                num_points=int(reconstruction.num_points3D()),
-                mean_reprojection_error_px=float(reconstruction.compute_mean_reprojection_error()),
-                mean_track_length=float(reconstruction.compute_mean_track_length()),
-            )
-        )
+        summaries.append(ModelSummary.of(reconstruction, folder / str(number)))
     if sidecar is not None:
         write_sidecar(fresh / FILE_NAME, sidecar)
     if state is not None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import pycolmap
 
 from sfm_front.errors import ConfigError
+from sfm_front.mapping.taking_over import take_over
 
 Part = Callable[
     [pycolmap.Reconstruction, Collection[int], Collection[int]], pycolmap.Reconstruction
@@ -116,21 +117,8 @@ class LocalRefinement:
             return
         apart = self._part(model, bundle, points)
         pycolmap.create_default_bundle_adjuster(self._adjustment, config, apart).solve()
-        _put_back(apart, model, bundle)
+        # Photos around it stood fixed: they are as they were.
+        take_over(model, apart)
 
     def _is_short(self, point: pycolmap.Point3D) -> bool:
         return not point.has_error() or point.track.length() <= self._options.max_track_length
-
-
-def _put_back(
-    apart: pycolmap.Reconstruction, model: pycolmap.Reconstruction, image_ids: Collection[int]
-) -> None:
-    """Take over poses of these photos, and all points and cameras: those that stood fixed are as
-    they were."""
-    for image_id in image_ids:
-        pose = apart.image(image_id).cam_from_world()
-        model.frame(model.image(image_id).frame_id).rig_from_world = pose
-    for point_id, point in apart.points3D.items():
-        model.point3D(point_id).xyz = point.xyz
-    for camera_id, camera in apart.cameras.items():
-        model.camera(camera_id).params = camera.params

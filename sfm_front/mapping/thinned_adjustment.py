@@ -13,6 +13,8 @@ from collections.abc import Callable, Collection
 import numpy as np
 import pycolmap
 
+from sfm_front.mapping.taking_over import take_over
+
 HUGE = 1000
 """Photos from which a model is adjusted by some of its points."""
 
@@ -40,16 +42,7 @@ def adjust_thinned(
     for point_id in others:
         thinned.delete_point3D(point_id)
     adjust(thinned)
-    for image_id in reconstruction.reg_image_ids():
-        image = reconstruction.image(image_id)
-        # A frame's only image is its camera.
-        reconstruction.frame(image.frame_id).rig_from_world = thinned.image(
-            image_id
-        ).cam_from_world()
-    for camera_id, camera in reconstruction.cameras.items():
-        camera.params = thinned.camera(camera_id).params
-    for point_id in chosen:
-        reconstruction.point3D(point_id).xyz = thinned.point3D(point_id).xyz
+    take_over(reconstruction, thinned)
     del thinned
     for start in range(0, len(others), _AT_A_TIME):
         _adjust_points(reconstruction, others[start : start + _AT_A_TIME], adjustment)

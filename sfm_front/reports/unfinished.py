@@ -69,7 +69,8 @@ def sum_up_so_far(
 ) -> RunSummary:
     """As of the moment when ``models`` were written: photos that came later are left out."""
     written = [
-        _summary(output / path, model) for path, model in zip(moment.paths, models, strict=True)
+        ModelSummary.of(model, output / path)
+        for path, model in zip(moment.paths, models, strict=True)
     ]
     photos = _photos(story, session, moment, written)
     return RunSummary(
@@ -118,17 +119,6 @@ def words_so_far(story: Story, moment: Moment) -> str:
             "and will be here when they are written next."
         )
     return words
-
-
-def _summary(folder: Path, model: pycolmap.Reconstruction) -> ModelSummary:
-    return ModelSummary(
-        path=folder,
-        reconstruction=model,
-        num_registered=int(model.num_reg_images()),
-        num_points=int(model.num_points3D()),
-        mean_reprojection_error_px=float(model.compute_mean_reprojection_error()),
-        mean_track_length=float(model.compute_mean_track_length()),
-    )
 
 
 def _photos(

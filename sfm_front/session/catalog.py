@@ -95,10 +95,10 @@ class FeatureMemory:
         """Hold on to them as long as there is room; the newest always stay."""
         with self._lock:
             self._kept[image_id] = features
-            self._num_bytes += _num_bytes(features)
+            self._num_bytes += features.num_bytes
             while self._num_bytes > self._max_bytes and len(self._kept) > 1:
                 _, dropped = self._kept.popitem(last=False)
-                self._num_bytes -= _num_bytes(dropped)
+                self._num_bytes -= dropped.num_bytes
 
     def clear(self) -> None:
         """Let go of all."""
@@ -115,7 +115,3 @@ class FeatureMemory:
         features = self._stored(image_id)
         self.keep(image_id, features)
         return features
-
-
-def _num_bytes(features: Features) -> int:
-    return sum(part.nbytes for part in (features.keypoints, features.descriptors, features.colors))

@@ -11,6 +11,7 @@ import pycolmap
 from sfm_front.georeference.control.fixed_lookouts import Lookouts
 from sfm_front.georeference.control.triangulation import Sighting
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, robust_adjustment
+from sfm_front.mapping.taking_over import take_over
 from sfm_front.types import Float64Array
 
 
@@ -71,16 +72,5 @@ def adjust_with_control(
         adjustment = robust_adjustment(options, reconstruction.num_reg_images())
         adjustment.ceres.loss_function_type = loss
         pycolmap.create_default_bundle_adjuster(adjustment, config, model).solve()
-    take_back(reconstruction, model)
-
-
-def take_back(reconstruction: pycolmap.Reconstruction, adjusted: pycolmap.Reconstruction) -> None:
-    """What is in both becomes as in the second."""
-    for frame_id in reconstruction.reg_frame_ids():
-        frame = reconstruction.frame(frame_id)
-        frame.rig_from_world = adjusted.frame(frame_id).rig_from_world
-    for camera_id, camera in reconstruction.cameras.items():
-        camera.params = adjusted.camera(camera_id).params
-    for point_id in reconstruction.point3D_ids():
-        reconstruction.point3D(point_id).xyz = adjusted.point3D(point_id).xyz
+    take_over(reconstruction, model)
     reconstruction.update_point_3d_errors()

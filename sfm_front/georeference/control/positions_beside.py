@@ -13,10 +13,10 @@ from sfm_front.georeference.control.adjustment import (
     HeldCamera,
     HeldPoint,
     adjust_with_control,
-    take_back,
 )
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, median_error
 from sfm_front.mapping.position_priors import PositionPriors, PriorOptions
+from sfm_front.mapping.taking_over import take_over
 from sfm_front.types import Float64Array
 
 # Adjustments at most; from each it is seen better by how much all positions are off, up to this
@@ -71,7 +71,8 @@ class PositionsBeside:
         distances = np.linalg.norm(self._residuals(offset) / self._sigmas, axis=1)
         rise = median_error(self._model) / max(error, _LEAST_ERROR_PX) - 1
         if float(np.median(distances)) > _TOO_FAR or rise > PriorOptions().max_error_rise:
-            take_back(self._model, before)
+            take_over(self._model, before)
+            self._model.update_point_3d_errors()
             return 0
         return len(self._image_ids)
 
