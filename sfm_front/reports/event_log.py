@@ -91,15 +91,22 @@ _NAMES: dict[type, str] = {
 class EventLog(Closeable):
     """Writes events to a stream; each line is handed to the system at once."""
 
-    def __init__(self, stream: IO[str]) -> None:
+    def __init__(self, stream: IO[str], last_added: int | None = None) -> None:
+        """``last_added``: image id of the last photo that an earlier process acknowledged there, 0
+        before the first; None if there was no such file."""
         self._stream = stream
+        self._last_added = last_added
 
     @classmethod
     def in_folder(cls, output: Path) -> EventLog:
         """Append to ``output/events.jsonl``; a line that a killed process left torn is removed."""
         file = output / FILE
-        _drop_torn_line(file)
-        return cls(file.open("a", encoding="utf-8"))
+        last_added = _without_torn_line(file)
+        return cls(file.open("a", encoding="utf-8"), last_added)
+
+    def lacks(self, image_id: int) -> bool:
+        """Whether the process that stored a photo ended before it could acknowledge it here."""
+        return self._last_added is not None and image_id > self._last_added
 
     def write(self, event: Event) -> None:
         """Write an event. Raises StorageError where it cannot be written."""
@@ -143,11 +150,18 @@ def _plain(value: object) -> object:
     return str(value)
 
 
-def _drop_torn_line(file: Path) -> None:
+def _without_torn_line(file: Path) -> int | None:
+    """Remove what a killed process left of a line; see ``EventLog`` for what is returned."""
     if not file.is_file():
-        return
+        return None
     with file.open("rb+") as content:
         data = content.read()
         whole = data.rfind(b"\n") + 1
         if whole < len(data):
             content.truncate(whole)
+    # Within the values of a line, quotes are escaped.
+    place = data.rfind(b'"event": "photo_added"', 0, whole)
+    if place < 0:
+        return 0
+    line = data[data.rfind(b"\n", 0, place) + 1 : data.index(b"\n", place)]
+    return int(json.loads(line)["image_id"])

@@ -12,6 +12,7 @@ from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.mapping.model_state import ModelState
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.reports.cluster_outcome import ClusterOutcome
+from sfm_front.reports.event_log import EventLog
 from sfm_front.runtime.stopwatch import Stopwatch
 from sfm_front.session.pair_matching import candidate_outcomes
 from sfm_front.session.parts import restore
@@ -45,11 +46,11 @@ class GivenSession(Session):
     and does all the rest. Photos enter in order, each in one transaction, once they are matched, so
     that any session can go on with what is there."""
 
-    def _restore(self, *, is_known: bool) -> None:
+    def _restore(self, log: EventLog, *, is_known: bool) -> None:
         # Snapshots written meanwhile have the models of some groups only.
         whole = is_known and self.database.recall(_STAGE) != _GROWING
         snapshot = read_snapshot(self.output / "sparse") if whole else None
-        restore(self._parts, snapshot, self._announcer, grow=False)
+        restore(self._parts, snapshot, self._announcer, log, grow=False)
 
     def _map(self, image_id: int, /) -> list[int]:
         self._parts.atlas.know(image_id)

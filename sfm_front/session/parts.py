@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from sfm_front.events import PhotoAdded
 from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor
 from sfm_front.mapping.atlas import Atlas
@@ -15,6 +17,7 @@ from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.photos.cameras import CameraCatalog
 from sfm_front.photos.positions import OFF
 from sfm_front.photos.reader import PhotoReader
+from sfm_front.reports.event_log import EventLog
 from sfm_front.reports.run_report import RunReport
 from sfm_front.retrieval.rerank import Reranker
 from sfm_front.retrieval.retriever import Retriever
@@ -31,6 +34,7 @@ from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.second_look import SecondLook
 from sfm_front.session.snapshots import Snapshot
 from sfm_front.storage.database import DATABASE, PhotoDatabase
+from sfm_front.types import StoredPhoto
 
 
 @dataclass(frozen=True)
@@ -118,10 +122,16 @@ def open_parts(
 
 
 def restore(
-    parts: SessionParts, snapshot: Snapshot | None, announcer: Announcer, *, grow: bool = True
+    parts: SessionParts,
+    snapshot: Snapshot | None,
+    announcer: Announcer,
+    log: EventLog,
+    *,
+    grow: bool = True,
 ) -> None:
     """Go on with the photos in the database: models from the snapshot, what came after it anew,
-    unless somebody else is to ``grow`` models of it."""
+    unless somebody else is to ``grow`` models of it. The ``log`` is made to acknowledge them all.
+    """
     database, atlas = parts.database, parts.atlas
     for skipped, _ in database.skipped():
         parts.report.add(skipped)
@@ -140,6 +150,7 @@ def restore(
         pairs = database.pairs(image_id)
         parts.view_graph.add(image_id, photo.name, camera, keypoints, pairs)
         parts.second_look.note(image_id, (pair.image_id2 for pair in pairs))
+        placed: list[int] | None = None
         if snapshot is not None and image_id == num_mapped:
             atlas.restore(snapshot.models)
             if snapshot.georeferencing is not None:
@@ -149,6 +160,24 @@ def restore(
         elif image_id > num_mapped:
             placed = atlas.add(image_id)
             parts.georeferencing.follow(atlas.models)
+        if log.lacks(image_id):
+            log.write(_added(parts, photo, placed or ()))
+        if placed is not None:
             announcer.tell_outcome(atlas, image_id, placed)
     # Of earlier photos, whose reports are written.
     announcer.pop_model_events()
+
+
+def _added(parts: SessionParts, photo: StoredPhoto, placed: Sequence[int]) -> PhotoAdded:
+    """What its own process would have told of a photo, as far as it is known here."""
+    return PhotoAdded(
+        name=photo.name,
+        image_id=photo.image_id,
+        num_keypoints=photo.num_keypoints,
+        candidates=photo.candidates,
+        registered=tuple(map(parts.catalog.name, placed)),
+        num_registered=len(parts.atlas.registered),
+        num_points=parts.atlas.num_points,
+        seconds=photo.seconds,
+        events=(),
+    )

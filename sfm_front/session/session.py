@@ -158,11 +158,11 @@ class Session(Closeable):
         self.num_restored = self.database.num_photos()
         self._announcer.tell(SessionStarted(VERSION, as_dict(self.options), self.num_restored))
         mark_running(self.database, self.options)
-        self._restore(is_known=known)
+        self._restore(event_log, is_known=known)
 
-    def _restore(self, *, is_known: bool) -> None:
+    def _restore(self, log: EventLog, *, is_known: bool) -> None:
         snapshot = read_snapshot(self.output / "sparse") if is_known else None
-        restore(self._parts, snapshot, self._announcer)
+        restore(self._parts, snapshot, self._announcer, log)
 
     def add(self, path: Path, name: str | None = None) -> PhotoAdded | Skipped:
         """Take in one photo; ``name`` is what it is called in the models (default: the file's)."""

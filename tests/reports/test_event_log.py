@@ -25,6 +25,21 @@ def test_a_torn_line_of_a_killed_process_is_dropped(tmp_path):
     assert [json.loads(line)["name"] for line in lines] == ["a.jpg", "b.jpg"]
 
 
+def test_what_earlier_processes_acknowledged_is_known(tmp_path):
+    with EventLog.in_folder(tmp_path) as log:
+        assert not log.lacks(1)  # nobody could have written it before there was a file
+        log.write(PhotoArrived("a.jpg"))
+    with EventLog.in_folder(tmp_path) as log:
+        assert log.lacks(1)
+    with (tmp_path / FILE).open("a", encoding="utf-8") as file:
+        file.write(json.dumps({"event": "photo_added", "image_id": 6}) + "\n")
+        file.write(json.dumps({"event": "photo_arrived", "name": '"event": "photo_added"'}) + "\n")
+        file.write('{"event": "photo_added", "image_id": 7')  # torn
+    with EventLog.in_folder(tmp_path) as log:
+        assert not log.lacks(6)
+        assert log.lacks(7)
+
+
 @pytest.mark.parametrize("kind", get_args(Event))
 def test_each_event_is_in_the_schema(kind):
     name = event_log._NAMES[kind]

@@ -62,6 +62,30 @@ def assert_whole(result: SessionResult, orbit: SyntheticScene, output: Path) -> 
 
 @pytest.mark.parametrize("seconds", [ALWAYS, NEVER])
 @pytest.mark.parametrize("stop_after", [1, 7])
+def test_a_photo_whose_process_was_killed_before_it_told_of_it_is_acknowledged(
+    orbit, photos, tmp_path, monkeypatch, stop_after, seconds
+):
+    monkeypatch.setattr(snapshots, "_MAX_SHARE", math.inf)
+    output, log = tmp_path / "out", tmp_path / "out" / "events.jsonl"
+    with Session(output, options(snapshot_seconds=seconds)) as session:
+        for photo in photos[:stop_after]:
+            session.add_extracted(photo)
+    whole = [line for line in log.read_text().splitlines() if '"photo_added"' in line]
+    last = whole[-1]
+    log.write_text(log.read_text().partition(last)[0])
+    for _ in range(2):
+        with Session(output, options(), resume=True):
+            pass
+        events = [json.loads(line) for line in log.read_text().splitlines()]
+        added = [event for event in events if event["event"] == "photo_added"]
+        assert [event["name"] for event in added] == [orbit.name(i) for i in range(stop_after)]
+        told = json.loads(last)
+        kept = ("image_id", "num_keypoints", "num_registered", "verified")
+        assert {key: added[-1][key] for key in kept} == {key: told[key] for key in kept}
+
+
+@pytest.mark.parametrize("seconds", [ALWAYS, NEVER])
+@pytest.mark.parametrize("stop_after", [1, 7])
 def test_a_session_that_was_not_finished_is(
     orbit, photos, tmp_path, monkeypatch, stop_after, seconds
 ):
