@@ -15,18 +15,16 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import auc, pose_errors
 from sfm_front.evaluation.process import resident_bytes
 from sfm_front.evaluation.reconstruction.colmap_memory import colmap_memory_bytes
+from sfm_front.evaluation.synthetic.positions import camera_centers, measured_positions
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, as_described, make_scene
 from sfm_front.events import PhotoAdded
 from sfm_front.features.global_descriptors.descriptor import resolve
-from sfm_front.geometry.enu import LocalFrame
 from sfm_front.georeference.accuracy import bend_of_heights
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
-from sfm_front.types import Float64Array, GeoPosition
+from sfm_front.types import Float64Array
 
 _DESCRIPTOR = "vlad"
-# Where on earth the scene is, any place.
-_TAKE_OFF = LocalFrame(47.0, 8.0, 400.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +176,7 @@ def run_stream(
     if num_photos < 2:
         raise ConfigError(f"a stream needs at least two photos, got {num_photos}")
     scene = make_scene(num_photos, points_per_image, seed=seed, layout="strip", lens=lens)
-    positions = _positions(scene, gps_noise_m)
+    positions = measured_positions(scene, gps_noise_m)
     descriptor, _ = resolve(_DESCRIPTOR)
     costs: list[PhotoCost] = []
     at_start, beside = resident_bytes(), _of_ended_processes()
@@ -228,25 +226,6 @@ def _of_ended_processes() -> float:
     return times.children_user + times.children_system
 
 
-def _positions(scene: SyntheticScene, noise_m: float | None) -> list[GeoPosition | None]:
-    """What GPS has of each photo."""
-    if noise_m is None:
-        return [None] * len(scene)
-    if not 0 < noise_m < float("inf"):
-        raise ConfigError(f"the noise of GPS must be a number of metres above 0, got {noise_m}")
-    rng = np.random.default_rng([scene.seed, 2])
-    measured = _centres(scene) + rng.normal(0.0, noise_m, (len(scene), 3))
-    return [
-        GeoPosition(latitude, longitude, altitude, noise_m, noise_m)
-        for latitude, longitude, altitude in _TAKE_OFF.to_wgs84(measured).tolist()
-    ]
-
-
-def _centres(scene: SyntheticScene) -> Float64Array:
-    """(N, 3) where the photos were taken; east, north and up in metres."""
-    return np.array([pose.inverse().translation for pose in scene.cams_from_world])
-
-
 def _bend_share(scene: SyntheticScene, models: Sequence[pycolmap.Reconstruction]) -> float | None:
     """Of the largest model, laid upon the truth by the best similarity."""
     if not models:
@@ -255,7 +234,7 @@ def _bend_share(scene: SyntheticScene, models: Sequence[pycolmap.Reconstruction]
     index = {scene.name(i): i for i in range(len(scene))}
     images = [model.image(image_id) for image_id in model.reg_image_ids()]
     found = np.array([image.projection_center() for image in images])
-    true = _centres(scene)[[index[image.name] for image in images]]
+    true = camera_centers(scene)[[index[image.name] for image in images]]
     enu_from_model = pycolmap.estimate_sim3d(found, true)
     if enu_from_model is None:
         return None
