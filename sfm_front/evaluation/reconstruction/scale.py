@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from sfm_front.errors import InputError
+from sfm_front.evaluation.power_law import PowerLaw
 from sfm_front.evaluation.reconstruction.stream import Memory, PhotoCost, StreamResult
-from sfm_front.types import Float64Array
 
 # Photos whose cost is what late ones are compared with, in a stream of so many, and how many are
 # late.
@@ -79,23 +79,6 @@ class Scale:
 
 
 @dataclass(frozen=True, slots=True)
-class PowerLaw:
-    """``factor`` times the number of photos to the power ``exponent``, by least squares of the
-    logarithms."""
-
-    factor: float
-    exponent: float
-
-    @classmethod
-    def through(cls, numbers: Sequence[float] | Float64Array, values: Float64Array) -> PowerLaw:
-        exponent, logarithm = np.polyfit(np.log(numbers), np.log(values), 1)
-        return cls(float(np.exp(logarithm)), float(exponent))
-
-    def at(self, number: float) -> float:
-        return float(self.factor * number**self.exponent)
-
-
-@dataclass(frozen=True, slots=True)
 class Line:
     """``start`` and ``per_photo`` of each photo, by least squares."""
 
@@ -135,7 +118,7 @@ class Fit:
         known = [peak for peak in peaks if peak is not None]
         return cls(
             PowerLaw.through(numbers[_FIT_FROM:], total[_FIT_FROM:]),
-            PowerLaw.through(lengths, np.array([r.finish_processor_seconds for r in results])),
+            PowerLaw.through(lengths, [r.finish_processor_seconds for r in results]),
             Line.through(lengths, known) if len(known) == len(peaks) else None,
         )
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from sfm_front.cluster.work import DESCRIBE, GROW, JOIN, MATCH
 from sfm_front.errors import InputError
+from sfm_front.evaluation.power_law import PowerLaw
 from sfm_front.reports.cluster_outcome import ClusterOutcome, TaskKindOutcome, cluster_of_row
 
 # Stages of the coordinator while workers work, as ``cluster/`` names them.
@@ -71,24 +72,9 @@ class TaskCost:
 
 
 @dataclass(frozen=True, slots=True)
-class SerialCost:
-    """Seconds of the coordinator for n photos in all: ``scale`` * n ** ``exponent``."""
-
-    scale: float
-    exponent: float = 1.0
-
-    def total(self, num_photos: float) -> float:
-        """For the first so many photos."""
-        return self.scale * num_photos**self.exponent if num_photos > 0 else 0.0
-
-    def between(self, first: float, last: float) -> float:
-        """For the photos from ``first`` on to ``last``."""
-        return self.total(last) - self.total(first)
-
-
-@dataclass(frozen=True, slots=True)
 class Costs:
-    """``describe``, ``match``, ``grow`` and ``join`` per photo of a task; ``end``: after all tasks.
+    """``describe``, ``match``, ``grow`` and ``join`` per photo of a task. The others in seconds of
+    the coordinator for all photos; ``end``: after all tasks.
 
     ``group`` and ``take`` count photos of groups, which overlap by ``overlap`` of their size.
     """
@@ -97,12 +83,12 @@ class Costs:
     match: TaskCost
     grow: TaskCost
     join: TaskCost
-    retrieve: SerialCost
-    store: SerialCost
-    cut: SerialCost
-    group: SerialCost
-    take: SerialCost
-    end: SerialCost
+    retrieve: PowerLaw
+    store: PowerLaw
+    cut: PowerLaw
+    group: PowerLaw
+    take: PowerLaw
+    end: PowerLaw
     start_seconds: float
     group_size: int
     overlap: float
@@ -127,7 +113,7 @@ class Costs:
                 "photo costs depends on it. Give runs with the same --group-size."
             )
 
-        def stage(name: str) -> SerialCost:
+        def stage(name: str) -> PowerLaw:
             seconds = [run.outcome.serial_seconds.get(name, 0.0) for run in runs]
             return _fitted([(run.num_photos, s) for run, s in zip(runs, seconds, strict=True)])
 
@@ -167,14 +153,7 @@ def _task_cost(runs: Sequence[ClusterRun], kind: str) -> TaskCost:
     )
 
 
-def _fitted(measured: Sequence[tuple[int, float]]) -> SerialCost:
-    """Photos and seconds of each run, by least squares of their logarithms."""
+def _fitted(measured: Sequence[tuple[int, float]]) -> PowerLaw:
+    """Photos and seconds of each run."""
     known = [(photos, seconds) for photos, seconds in measured if seconds > 0]
-    if not known:
-        return SerialCost(0.0)
-    photos, seconds = np.log(np.array(known, np.float64)).T
-    exponent = 1.0
-    if len(set(photos.tolist())) > 1:
-        # Nothing that is done for every photo becomes less with more of them.
-        exponent = max(0.0, float(np.polyfit(photos, seconds, 1)[0]))
-    return SerialCost(float(np.exp(np.mean(seconds - exponent * photos))), exponent)
+    return PowerLaw.through(*zip(*known, strict=True)) if known else PowerLaw(0.0)

@@ -115,7 +115,7 @@ class _Run:
         yield from self._group_stage()
         self.prediction.groups_s = self.env.now - self.prediction.photos_s
         self.prediction.busy = self._busy_s / (self.env.now * self.shape.num_workers)
-        self.prediction.end_s = self.costs.end.total(self.num_photos)
+        self.prediction.end_s = self.costs.end.at(self.num_photos)
         yield from self._compute(self.prediction.end_s)
         self.prediction.wall_s = self.env.now
 
@@ -156,7 +156,7 @@ class _Run:
     def _group_stage(self) -> Steps:
         """As ``cluster/group_stage.py``: groups are grown, and joined two at a time."""
         costs, threads = self.costs, self.shape.num_workers
-        yield from self._compute(costs.cut.total(self.num_photos))
+        yield from self._compute(costs.cut.at(self.num_photos))
         ready = deque(self._plan_groups(num_parts(self.num_photos, costs.group_size, threads)))
         read, taken = 0.0, 0.0
         while ready or self._under_way:

@@ -12,10 +12,10 @@ import pytest
 from helpers.locations import SCRIPTS
 
 from sfm_front.errors import InputError
+from sfm_front.evaluation.power_law import PowerLaw
 from sfm_front.evaluation.reconstruction.scale import (
     Fit,
     Line,
-    PowerLaw,
     Scale,
     format_scale,
     read_result,

@@ -50,21 +50,21 @@ def test_tasks_cost_what_they_took_per_photo():
 
 def test_of_one_size_the_coordinator_works_in_proportion():
     costs = Costs.of([measured(40, end_s=3.0)])
-    assert costs.end.total(40) == pytest.approx(3.0)
-    assert costs.end.total(400) == pytest.approx(30.0)
+    assert costs.end.at(40) == pytest.approx(3.0)
+    assert costs.end.at(400) == pytest.approx(30.0)
 
 
 def test_of_two_sizes_it_follows_a_power():
     costs = Costs.of([measured(40, end_s=2.0), measured(160, end_s=16.0)])
     assert costs.end.exponent == pytest.approx(1.5)
-    assert costs.end.total(640) == pytest.approx(128.0)
+    assert costs.end.at(640) == pytest.approx(128.0)
     assert costs.end.between(160, 640) == pytest.approx(112.0)
-    assert costs.end.total(0) == 0
+    assert costs.end.at(0) == 0
 
 
 def test_ends_of_larger_sessions_count_too():
     costs = Costs.of([measured(40, end_s=2.0)], {160: 16.0})
-    assert costs.end.total(640) == pytest.approx(128.0)
+    assert costs.end.at(640) == pytest.approx(128.0)
 
 
 def test_groups_of_several_sizes_cannot_be_compared():

@@ -8,11 +8,12 @@ import pytest
 from helpers.cluster_reports import measured
 
 from sfm_front.errors import ConfigError
-from sfm_front.evaluation.scaling.costs import Costs, SerialCost, TaskCost
+from sfm_front.evaluation.power_law import PowerLaw
+from sfm_front.evaluation.scaling.costs import Costs, TaskCost
 from sfm_front.evaluation.scaling.simulation import ClusterShape, simulate
 
 FAST_WAY = 1e15
-NOTHING = SerialCost(0.0)
+NOTHING = PowerLaw(0.0)
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def test_groups_are_joined_in_rounds_until_two_are_left(costs):
 
 
 def test_the_coordinator_alone_makes_the_end(costs):
-    with_end = replace(costs, end=SerialCost(0.02, 1.0))
+    with_end = replace(costs, end=PowerLaw(0.02, 1.0))
     one, many = (simulate(with_end, 2000, shape(n)) for n in (1, 1000))
     assert one.end_s == many.end_s == pytest.approx(40.0)
     assert many.wall_s > 40
@@ -62,7 +63,7 @@ def test_the_coordinator_alone_makes_the_end(costs):
 
 def test_a_slow_coordinator_keeps_workers_waiting(costs):
     # Storing takes a second a photo: no number of workers is faster than that.
-    slow = replace(costs, store=SerialCost(1.0))
+    slow = replace(costs, store=PowerLaw(1.0))
     many = simulate(slow, 400, shape(64))
     assert 400 <= many.photos_s <= 420
     assert many.busy < 0.05
