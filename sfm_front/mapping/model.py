@@ -23,6 +23,7 @@ from sfm_front.mapping.final_adjustment import drop_misfits, final_adjustment
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
 from sfm_front.mapping.model_state import ModelState
+from sfm_front.mapping.next_image import NextImage
 from sfm_front.mapping.position_priors import PositionPriors, held_to_positions
 from sfm_front.mapping.refinement_beside import RefinementBeside
 from sfm_front.mapping.refinement_schedule import RefinementSchedule
@@ -63,7 +64,7 @@ class Model:
         self._triangulation = self._streaming.get_triangulation()
         self._local = LocalRefinement(self._streaming, options.local_refinement, view_graph.part)
         self._schedule = RefinementSchedule(options.schedule)
-        self._seen_at_failure: dict[int, int] = {}
+        self._next = NextImage(options.retry_growth)
         self._mapper, self.reconstruction = view_graph.new_mapper(reconstruction)
 
     @classmethod
@@ -322,29 +323,18 @@ class Model:
 
     def forget_failures(self) -> None:
         """Allow every waiting photo to be retried."""
-        self._seen_at_failure.clear()
+        self._next.forget_failures()
 
     def _best(self, waiting: Iterable[int]) -> int | None:
-        """The waiting photo with the best spread of visible points, if one is worth a trial."""
-        visible = self._mapper.observation_manager
-        best: tuple[int, int] | None = None
-        for image_id in waiting:
-            num_visible = visible.num_visible_points3D(image_id)
-            if num_visible < self._mapping.abs_pose_min_num_inliers:
-                continue
-            if num_visible < self._options.retry_growth * self._seen_at_failure.get(image_id, 0):
-                continue
-            rank = (visible.point3D_visibility_score(image_id), -image_id)
-            if best is None or rank > best:
-                best = rank
-        return None if best is None else -best[1]
+        min_visible = self._mapping.abs_pose_min_num_inliers
+        return self._next.best(self._mapper.observation_manager, waiting, min_visible)
 
     def _register(self, image_id: int) -> bool:
-        num_visible = self._mapper.observation_manager.num_visible_points3D(image_id)
+        num_visible = self.num_visible_points(image_id)
         if self._mapper.register_next_image(self._mapping, image_id):
             self._mapper.triangulate_image(self._triangulation, image_id)
             return True
-        self._seen_at_failure[image_id] = num_visible
+        self._next.failed(image_id, num_visible)
         return False
 
     def _refine_while_growing(self) -> None:
