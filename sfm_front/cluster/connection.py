@@ -52,8 +52,10 @@ class Cluster:
         return sum(self._threads.values())
 
     def look(self) -> None:
-        """Note which workers have come and gone; a line for each that is not used."""
+        """Note which workers have come and gone; a line for each that has gone or is not used."""
         there: dict[str, Any] = self.client.scheduler_info(n_workers=-1)["workers"]
+        for address in self._threads.keys() - there.keys():
+            self.note(f"worker {address} is gone: what it had begun is begun again elsewhere")
         new = there.keys() - self._threads.keys() - self._refused.keys()
         for address, found in self._ask(new).items():
             if found == identity():

@@ -50,6 +50,18 @@ def test_a_worker_with_another_package_is_not_used(
     assert len(told) == 1
 
 
+def test_a_worker_that_has_gone_is_told_of_once(threads: Cluster) -> None:
+    told: list[str] = []
+    cluster = Cluster(threads.client, "inproc", told.append)
+    cluster.require_workers()
+    gone, left = sorted(cluster.workers)
+    threads.client.retire_workers([gone])
+    cluster.look()
+    cluster.look()
+    assert told == [f"worker {gone} is gone: what it had begun is begun again elsewhere"]
+    assert cluster.workers == {left}
+
+
 @pytest.mark.slow
 def test_no_worker_with_this_package_is_an_error(
     threads: Cluster, monkeypatch: pytest.MonkeyPatch
