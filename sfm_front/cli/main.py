@@ -21,7 +21,9 @@ from sfm_front.errors import SfmFrontError
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; the exit status. Mistakes of the user end in one line and status 2."""
     with unfailing_streams() as why_incomplete:
-        arguments = make_parser().parse_args(argv)
+        given = sys.argv[1:] if argv is None else argv
+        arguments = make_parser().parse_args(given)
+        arguments.given = given
         status = _run(arguments)
         lost = why_incomplete()
         if lost is not None:

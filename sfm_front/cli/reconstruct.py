@@ -13,6 +13,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sfm_front.cli.command_again import command_again
 from sfm_front.cli.progress import ProgressLine
 from sfm_front.cli.reconstruct_arguments import add_arguments as add_arguments
 from sfm_front.cli.reconstruct_arguments import session_options
@@ -70,10 +71,9 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
     overwrite, append = arguments.overwrite, arguments.append
     # Once more: pycolmap has put a handler of its own for SIGTERM in place.
     with leaving_at_signal(1):
-        from sfm_front.live_page.extra import scene_if_possible
+        from sfm_front.live_page.files import write_files, written_if_it_fails
+        from sfm_front.live_page.files_beside_session import FilesBesideSession
         from sfm_front.photos.watch import WatchOptions, check_watchable, watch_photos
-        from sfm_front.reports.html.beside_session import ReportBesideSession
-        from sfm_front.reports.html.page import write_page
         from sfm_front.session.given import GivenSession
         from sfm_front.session.output_folder import holds_session, told_of_others
         from sfm_front.session.resume import Newcomers, nothing_to_do
@@ -101,8 +101,14 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
         if cluster is not None:
             cluster.ready()
         session = (Session if cluster is None else GivenSession)(
-            output, options, overwrite=overwrite, resume=not overwrite, on_event=on_event
+            output,
+            options,
+            overwrite=overwrite,
+            resume=not overwrite,
+            on_event=on_event,
+            command=command_again(arguments.given),
         )
+    opened.enter_context(written_if_it_fails(output))
     with session, closing(progress), leaving_at_signal(2, _STOPPING) as interrupted:
         for message in session.messages:
             progress.note(message)
@@ -126,7 +132,7 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
             progress.expect(len(new))
             arriving = new
         taken = 0
-        with ReportBesideSession(output):
+        with FilesBesideSession(output):
             if cluster is not None:
                 assert isinstance(session, GivenSession)
                 result, taken = cluster.reconstruct(session, new, interrupted)
@@ -135,15 +141,16 @@ def _run(arguments: argparse.Namespace, opened: ExitStack) -> int:
                     taken += 1
                     if interrupted():
                         break
-                result = session.finish()
+                result = session.finish(0 if arguments.watch else len(new) - taken)
         progress.step("drawing the page")
-        scene_if_possible(output)
-        write_page(output)
+        write_files(output)
         progress.close()
         tell_result(arguments, result.summary, output, spoken)
         if not arguments.watch and taken < len(new):
             left = counted(len(new) - taken, "photo")
-            print(f"stopped with {left} to go: the same command goes on from there", file=spoken)
+            without = " without --overwrite" if overwrite else ""
+            told = f"stopped with {left} to go: the same command{without} goes on from there"
+            print(told, file=spoken)
     if page is not None:
         with leaving_at_signal(2, CLOSING) as interrupted:
             page.stay(interrupted)

@@ -22,15 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write ``report.html`` into the output; 0 if it was written."""
-    from sfm_front.live_page.extra import scene_if_possible
-    from sfm_front.reports.html.page import write_page
+    from sfm_front.live_page.files import write_files
     from sfm_front.reports.report_json import read_report
-    from sfm_front.reports.unfinished import story_if_unfinished
+    from sfm_front.reports.standing import read_story
 
-    if story_if_unfinished(arguments.output) is None:
+    if not read_story(arguments.output).is_unfinished:
         read_report(arguments.output)  # Where no session has been, nothing is made.
-    scene = scene_if_possible(arguments.output)
-    file = write_page(arguments.output, arguments.photos)  # Has a link to the scene.
+    file, scene = write_files(arguments.output, arguments.photos)
     print(file if arguments.quiet else f"wrote {file}: open it in a browser")
     if scene is not None and not arguments.quiet:
         print(f"wrote {scene}: the models to turn in a browser")

@@ -116,7 +116,7 @@ class Coordinator:
                 group_size=self._options.group_size,
             )
         )
-        return self._session.finish()
+        return self._session.finish(self._photos.num_photos - self.num_taken)
 
     def _tell(self) -> None:
         photos, groups = self._photos, self._groups

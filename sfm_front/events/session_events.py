@@ -9,11 +9,15 @@ from typing import Any, TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class SessionStarted:
-    """A session begins, or goes on: ``num_photos`` of it are there already."""
+    """A session begins, or goes on: ``num_photos`` of it are there already.
+
+    ``command``: what goes on with it if it is stopped; empty where that is not known.
+    """
 
     version: str
     options: dict[str, Any]
     num_photos: int = 0
+    command: str = ""
 
 
 class FinishingStep(Enum):
@@ -53,12 +57,16 @@ class FinishingBegan:
 
 @dataclass(frozen=True, slots=True)
 class SessionEnded:
-    """All models are written, or, if not ``finished``, those of the last snapshot stay."""
+    """All models are written, or, if not ``finished``, those of the last snapshot stay.
+
+    ``num_left``: photos of which it knew, and which it has not taken, for it was stopped before.
+    """
 
     finished: bool
     num_photos: int
     num_registered: int
     num_models: int
+    num_left: int = 0
 
 
 SessionEvent: TypeAlias = SessionStarted | FinishingBegan | SessionEnded

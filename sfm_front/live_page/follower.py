@@ -11,6 +11,7 @@ from sfm_front.live_page.model_shapes import ModelReader, Models, ModelShape
 from sfm_front.reports import event_log, report_json
 from sfm_front.reports.event_tail import EventTail
 from sfm_front.reports.run_summary import RunSummary
+from sfm_front.reports.standing import Standing, standing
 from sfm_front.reports.story import GIVEN_UP, PhotoState, PhotoStory, Story
 from sfm_front.reports.verdict import Verdict, verdict
 from sfm_front.storage.colmap_models import is_model
@@ -33,13 +34,14 @@ class Outcome:
 class Seen:
     """``models``: those of ``sparse/``. ``fresh``: photos that were placed since these were
     written, whose poses are in the same frames. ``outcomes`` by name, in order of arrival.
-    ``verdict``: once the session has finished."""
+    ``verdict``: once the session has finished. ``standing``: how it stands, of a session."""
 
     story: Story
     models: Sequence[ModelShape]
     fresh: Sequence[PhotoStory]
     outcomes: Mapping[str, Outcome]
     verdict: Verdict | None = None
+    standing: Standing = Standing.RUNS
 
     def named(self, state: PhotoState) -> list[Outcome]:
         """The photos in this state."""
@@ -48,7 +50,7 @@ class Seen:
     @property
     def newest(self) -> PhotoStory | None:
         """The photo that came last, while others may follow."""
-        return self.story.newest if self.story.ended is None else None
+        return self.story.newest if self.standing is Standing.RUNS else None
 
     @property
     def weak(self) -> list[Outcome]:
@@ -61,29 +63,39 @@ class OutputFollower:
 
     def __init__(self, output: Path) -> None:
         """``output`` of a session, or a COLMAP model of any program."""
-        self._report = output / report_json.FILE
+        self._output = output
         self._tail = EventTail(output / event_log.FILE)
         self._reader = ModelReader(output if is_model(output) else output / "sparse")
         self._story = Story()
         self._models = Models([], 0.0)
         self._summary: RunSummary | None = None
+        self._standing = Standing.RUNS
         self._has_looked = False
 
     def look(self) -> Seen | None:
         """What is known now; None if nothing has changed since the last look."""
-        events, is_anew = self._tail.new()
-        if is_anew:
-            self._story, self._models, self._summary = Story(), Models([], 0.0), None
-        for event in events:
-            self._story.tell(event)
+        is_new = self._hear()
+        stands = standing(self._story, self._output)
+        if stands is Standing.BROKEN_OFF and self._hear():  # Its end, and then its lock was gone.
+            is_new, stands = True, standing(self._story, self._output)
         models = self._reader.new()
-        if models is None and not events and not is_anew and self._has_looked:
+        if models is None and not is_new and stands is self._standing and self._has_looked:
             return None
+        self._standing = stands
         self._has_looked = True
         self._models = models or self._models
         if self._story.ended:
             self._summary = self._read_summary()
         return self._seen()
+
+    def _hear(self) -> bool:
+        """Whether anything was told since the last time."""
+        events, is_anew = self._tail.new()
+        if is_anew:
+            self._story, self._models, self._summary = Story(), Models([], 0.0), None
+        for event in events:
+            self._story.tell(event)
+        return is_anew or bool(events)
 
     def _seen(self) -> Seen:
         shapes, written = self._models.shapes, self._models.written
@@ -113,7 +125,7 @@ class OutputFollower:
             for name, photo in photos.items()
         }
         judged = None if summary is None else verdict(summary, summary.sidecar)
-        return Seen(self._story, shapes, fresh, outcomes, judged)
+        return Seen(self._story, shapes, fresh, outcomes, judged, self._standing)
 
     def _outcome(
         self, photo: PhotoStory, in_model: Mapping[str, int], written: float, hint: str
@@ -132,6 +144,6 @@ class OutputFollower:
 
     def _read_summary(self) -> RunSummary | None:
         try:
-            return report_json.read_report(self._report.parent)
+            return report_json.read_report(self._output)
         except InputError:
             return None

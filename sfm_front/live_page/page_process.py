@@ -1,7 +1,8 @@
 """The page of ``reconstruct --viewer``, in a process of its own: OUTPUT PORT.
 
 It prints its address. Its session says ``ended`` on standard input when all is written: then the
-page stays while a browser shows it. It ends with its session's process in any case.
+page stays while a browser shows it. So it does, for a while, when the session's process is killed:
+who looks at it shall read so.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from sfm_front.runtime.priority import let_others_first
 
 # A page that is loaded anew is without its browser for a moment.
 _PATIENCE_S = 3.0
+# Nobody has a terminal any more to end it from.
+_ORPHAN_S = 600.0
 _NICE = 10
 
 
@@ -26,7 +29,7 @@ def main(output: Path, port: int) -> None:
     let_others_first(_NICE)
     has_ended, is_alone = Event(), Event()
     Thread(target=_listen, args=(has_ended, is_alone), daemon=True).start()
-    last_seen_s = float("-inf")
+    last_seen_s, orphaned_s = float("-inf"), float("inf")
 
     with LivePage(output, port) as page:
         # pycolmap would write a page of its own.
@@ -34,11 +37,15 @@ def main(output: Path, port: int) -> None:
         print(page.address, flush=True)
 
         def is_unwanted() -> bool:
-            nonlocal last_seen_s
+            nonlocal last_seen_s, orphaned_s
+            now_s = time.monotonic()
             if page.num_browsers:
-                last_seen_s = time.monotonic()
-            forsaken = time.monotonic() - last_seen_s > _PATIENCE_S
-            return is_alone.is_set() or (has_ended.is_set() and forsaken)
+                last_seen_s = now_s
+            if is_alone.is_set():
+                orphaned_s = min(orphaned_s, now_s)
+            is_over = has_ended.is_set() or is_alone.is_set()
+            is_forsaken = now_s - last_seen_s > _PATIENCE_S
+            return (is_over and is_forsaken) or now_s - orphaned_s > _ORPHAN_S
 
         page.run(is_unwanted)
 

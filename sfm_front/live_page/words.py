@@ -11,22 +11,23 @@ from sfm_front.live_page import palette
 from sfm_front.live_page.follower import Seen
 from sfm_front.live_page.markup_parts import PADDED, ROW, SCROLL, dot, what_became
 from sfm_front.reports.html.markup import Html, joined, tag
+from sfm_front.reports.standing import Standing, how_to_go_on
 from sfm_front.reports.story import PhotoState
 from sfm_front.reports.verdict import Verdict
 from sfm_front.reports.words import clock, counted
 
 _MOST_EVENTS = 14
-# A session that is this silent may be gone.
+# A session that is this silent is at something long.
 _SILENT_S = 60.0
 
 _TILE = "flex:1 1 5em;padding:.45em .6em;border-radius:.4em;background:rgba(128,134,145,.12)"
 _BIG = "font-size:1.25em;font-weight:600;line-height:1.2;white-space:nowrap"
+_ASIDE = "font-size:.82em;opacity:.8;overflow-wrap:anywhere;margin-top:.2em"
 _SMALL = "font-size:.75em;opacity:.72"
 
 
 def headline(seen: Seen, now: float | None = None) -> Html:
     """How far the session is, in figures; ``now``: seconds since 1970."""
-    story = seen.story
     placed = seen.named(PhotoState.PLACED)
     taken = [one for one in seen.outcomes.values() if one.state is not PhotoState.ARRIVED]
     num_points = sum(shape.num_points for shape in seen.models)
@@ -39,12 +40,12 @@ def headline(seen: Seen, now: float | None = None) -> Html:
     if recent:
         tiles.append(_tile(f"{sorted(recent)[len(recent) // 2]:.2f} s", "work a photo"))
     waiting, skipped = seen.named(PhotoState.WAITING), seen.named(PhotoState.SKIPPED)
-    queued = seen.named(PhotoState.ARRIVED)
+    queued, runs = seen.named(PhotoState.ARRIVED), seen.standing is Standing.RUNS
     notes = [
         dot(palette.WAITING, f"{counted(len(waiting), 'photo')} waiting") if waiting else None,
         dot(palette.WEAK, f"{len(seen.weak)} weakly held") if seen.weak else None,
         dot(palette.FAINT, f"{len(skipped)} not used") if skipped else None,
-        dot(palette.FAINT, f"{len(queued)} to come") if queued and story.ended is None else None,
+        dot(palette.FAINT, f"{len(queued)} to come") if queued and runs else None,
     ]
     return tag(
         "div",
@@ -72,11 +73,16 @@ def _status(seen: Seen, now: float) -> Html:
     if story.began is None or story.last is None:
         return tag("b", "a model" if seen.models else "waiting for a session to begin …")
     lasted = clock(story.last - story.began)
-    if story.ended is True:
-        return joined([dot(palette.LINK, tag("b", "finished")), f" after {lasted}"])
-    if story.ended is False:
-        return joined([dot(palette.WAITING, tag("b", "stopped")), f" after {lasted}"])
     silent_s = now - story.last
+    if seen.standing is Standing.FINISHED:
+        return joined([dot(palette.LINK, tag("b", "finished")), f" after {lasted}"])
+    if seen.standing is Standing.STOPPED:
+        left = f" with {counted(story.num_left, 'photo')} to go" if story.num_left else ""
+        said = [dot(palette.WEAK, tag("b", "stopped")), f" after {lasted}{left}", _go_on(seen)]
+        return joined(said)
+    if seen.standing is Standing.BROKEN_OFF:
+        told = f" after {lasted}: nothing heard for {clock(silent_s)}, no process here works on it"
+        return joined([dot(palette.WAITING, tag("b", "broken off")), told, _go_on(seen)])
     if story.step:
         # In one step there may be nothing to tell for minutes.
         return dot(palette.NEWEST, joined([tag("b", story.step), f" for {clock(silent_s)}"]))
@@ -85,6 +91,11 @@ def _status(seen: Seen, now: float) -> Html:
             [dot(palette.WEAK, tag("b", "running")), f", nothing new for {clock(silent_s)}"]
         )
     return joined([dot(palette.NEWEST, tag("b", "running")), f" for {clock(now - story.began)}"])
+
+
+def _go_on(seen: Seen) -> Html:
+    command = tag("code", seen.story.command) if seen.story.command else None
+    return tag("div", how_to_go_on(seen.story), " ", command, style=_ASIDE)
 
 
 def legend(seen: Seen) -> Html:

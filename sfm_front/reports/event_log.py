@@ -5,7 +5,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 
 | event | says |
 |---|---|
-| ``session_started`` | ``version`` of the package, all ``options``, ``num_photos`` there already |
+| ``session_started`` | ``version``, all ``options``, ``num_photos`` there, ``command`` to go on |
 | ``photo_arrived`` | the photo was noticed |
 | ``photo_skipped`` | ``reason`` and ``detail`` |
 | ``photo_described`` | it has its features, and its turn begins; ``seconds`` by stage |
@@ -21,7 +21,7 @@ Each line is a JSON object with ``v``, the version of this schema; ``time``, ISO
 | ``held_to_control_points`` | the finished model, with its ``origin`` and how well it fits |
 | ``control_points_refused`` | why they cannot be used; the model is left as it is |
 | ``finishing_began`` | no more photos come: a ``step`` of the end begins; ``turn``: for a model |
-| ``session_ended`` | ``finished``: whether all models are written |
+| ``session_ended`` | ``finished``: whether all models are written; ``num_left``: not taken |
 
 New fields and events leave the version as it is; readers pass over what they do not know.
 """

@@ -38,10 +38,10 @@ def _started(event: Event) -> str:
 def _ended(event: Event) -> str:
     if not event["finished"]:
         return "session stopped; the same command goes on"
-    return (
-        f"finished: {event['num_registered']} of {counted(event['num_photos'], 'photo')} in "
-        f"{counted(event['num_models'], 'model')}"
-    )
+    left = int(event.get("num_left", 0))
+    stopped = f"stopped with {counted(left, 'photo')} to go, " if left else ""
+    photos, models = counted(event["num_photos"], "photo"), counted(event["num_models"], "model")
+    return f"{stopped}finished: {event['num_registered']} of {photos} in {models}"
 
 
 def _refined(event: Event) -> str:

@@ -75,6 +75,9 @@ class Story:
         self.began: float | None = None
         self.last: float | None = None
         self.ended: bool | None = None
+        # Photos that it has not taken, and what takes them.
+        self.num_left = 0
+        self.command = ""
         # Of its end, in words, once that has begun.
         self.step = ""
         self.num_points = 0
@@ -96,6 +99,11 @@ class Story:
         if words:
             self.lines = [*self.lines[1 - _MOST_LINES :], (self.last, words)]
 
+    @property
+    def is_unfinished(self) -> bool:
+        """Whether there is a session that has not ended, or was stopped before its end."""
+        return self.began is not None and not self.ended
+
     def in_state(self, state: PhotoState) -> list[PhotoStory]:
         """The photos of which this is the state, in order of arrival."""
         return [photo for photo in self.photos.values() if photo.state is state]
@@ -109,14 +117,15 @@ class Story:
         return photo
 
     def _on_session_started(self, event: Mapping[str, Any]) -> None:
-        self.began, self.ended, self.step = self.last, None, ""
+        self.began, self.ended, self.step, self.num_left = self.last, None, "", 0
+        self.command = str(event.get("command", ""))
         self.few_pairs = int(event["options"]["second_look"]["min_pairs"])
 
     def _on_finishing_began(self, event: Mapping[str, Any]) -> None:
         self.step = in_words(event)
 
     def _on_session_ended(self, event: Mapping[str, Any]) -> None:
-        self.ended = bool(event["finished"])
+        self.ended, self.num_left = bool(event["finished"]), int(event.get("num_left", 0))
 
     def _on_photo_arrived(self, event: Mapping[str, Any]) -> None:
         self._photo(event)

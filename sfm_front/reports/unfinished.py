@@ -5,30 +5,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from pathlib import Path
 
 import pycolmap
 
-from sfm_front.reports import event_log
 from sfm_front.reports.camera_outcome import camera_outcomes
-from sfm_front.reports.event_tail import EventTail
 from sfm_front.reports.run_summary import ModelOutcome, Outcome, PhotoOutcome, RunSummary, Totals
+from sfm_front.reports.standing import Standing, how_to_go_on
 from sfm_front.reports.story import GIVEN_UP, PhotoState, PhotoStory, Story
-from sfm_front.reports.words import counted
+from sfm_front.reports.words import capitalized, counted, day_and_hour
 from sfm_front.storage.stored_session import StoredSession
 from sfm_front.storage.written_models import STATE, read_state
 from sfm_front.types import ModelSummary, Skipped, StoredPhoto
 
 _STILL_TO_BE_WRITTEN = "placed in a model that is still to be written"
-
-
-def story_if_unfinished(output: Path) -> Story | None:
-    """What a session told that has not ended, or was stopped before its end; None of any other."""
-    story = Story()
-    for event in EventTail(output / event_log.FILE).new()[0]:
-        story.tell(event)
-    return None if story.began is None or story.ended else story
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,26 +89,48 @@ def sum_up_so_far(
     )
 
 
-def words_so_far(story: Story, moment: Moment) -> str:
-    """How far the session is, and what is left out of its summary."""
-    at = datetime.fromtimestamp(story.last or 0.0, timezone.utc).strftime("%H:%M:%S UTC")
-    if story.ended is False:
-        words = f"Stopped at {at} before its end: the same command goes on."
-    elif story.step:
-        words = f"Not finished yet, but no more photos come. At {at}: {story.step}."
-    else:
-        words = f"Not finished yet: this is how far it was at {at}."
+def words_so_far(story: Story, stands: Standing, moment: Moment) -> str:
+    """How far a session is that is not finished, and what is left out of its summary. Its command
+    follows."""
+    words = f"{_how_it_stands(story, stands)} {_left_out(story, moment)}".strip()
+    if stands is not Standing.RUNS:
+        return f"{words} {capitalized(how_to_go_on(story))}"
+    return f"{words} If that is long ago, it was killed; {how_to_go_on(story)}"
+
+
+def words_of_stopped(story: Story) -> str:
+    """Of a session that was stopped, and finished with the photos that it had; else empty. Its
+    command follows."""
+    if not story.num_left:
+        return ""
+    left = counted(story.num_left, "photo")
+    go_on = capitalized(how_to_go_on(story))
+    return f"Stopped at {day_and_hour(story.last)}, and finished without {left} to go. {go_on}"
+
+
+def _how_it_stands(story: Story, stands: Standing) -> str:
+    at = day_and_hour(story.last)
+    if stands is Standing.STOPPED:
+        return f"Stopped at {at}, before its end."
+    if stands is Standing.BROKEN_OFF:
+        return f"Broken off: nothing was heard after {at}, and no process here works on it."
+    if story.step:
+        return f"Not finished yet, but no more photos come. At {at}: {story.step}."
+    return f"Not finished yet: this is how far it was at {at}."
+
+
+def _left_out(story: Story, moment: Moment) -> str:
     states = Counter(photo.state for photo in story.photos.values())
     taken = len(story.photos) - states[PhotoState.ARRIVED] - states[PhotoState.DESCRIBED]
     taken -= states[PhotoState.SKIPPED]
     later = 0 if moment.num_photos is None else taken - moment.num_photos
-    if later > 0:
-        which = "has" if later == 1 else "have"
-        words += (
-            f" {counted(later, 'photo')} {which} come since the models were written last, "
-            "and will be here when they are written next."
-        )
-    return words
+    if later <= 0:
+        return ""
+    which = "has" if later == 1 else "have"
+    return (
+        f"{counted(later, 'photo')} {which} come since the models were written last, "
+        "and will be here when they are written next."
+    )
 
 
 def _photos(

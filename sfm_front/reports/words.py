@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timezone
+
+_MONTHS = (
+    *("January", "February", "March", "April", "May", "June"),
+    *("July", "August", "September", "October", "November", "December"),
+)
+
 
 def counted(count: int, noun: str) -> str:
     """One photo, two photos."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def capitalized(sentence: str) -> str:
+    """With a capital at its beginning, and all else as it is."""
+    return sentence[:1].upper() + sentence[1:]
+
+
+def day_and_hour(seconds: float | None) -> str:
+    """Of a moment in seconds since 1970: 19:56:12 UTC on 30 November."""
+    at = datetime.fromtimestamp(seconds or 0.0, timezone.utc)
+    return f"{at:%H:%M:%S} UTC on {at.day} {_MONTHS[at.month - 1]}"
 
 
 def clock(seconds: float) -> str:

@@ -87,12 +87,14 @@ class Session(Closeable):
         overwrite: bool = False,
         resume: bool = False,
         on_event: Listener | None = None,
+        command: str = "",
     ) -> None:
         """``overwrite`` removes what an earlier session wrote to ``output``, and nothing else;
         ``resume`` goes on with it, however it ended.
 
         ``on_event`` is called with each event when it happens, in the thread that calls the
-        session, as ``events.jsonl`` has them.
+        session, as ``events.jsonl`` has them. ``command``: what a user gives to go on with this
+        session, for those who look at one that was stopped.
 
         Raises InputError if there is such a session and neither is wanted, if it was made with
         other options, if another process writes to it, or if the file of positions or of control
@@ -132,7 +134,7 @@ class Session(Closeable):
                 control_points,
                 self._announcer,
             )
-            self._go_on(opened)
+            self._go_on(opened, command)
             self._opened = opened.pop_all()
 
     @property
@@ -146,7 +148,7 @@ class Session(Closeable):
         at last."""
         return self._parts.georeferencing.georeference
 
-    def _go_on(self, opened: ExitStack) -> None:
+    def _go_on(self, opened: ExitStack, command: str) -> None:
         """Where an earlier run of this session stopped, if there was one."""
         known = check_options(self.database, self.options, self.output)
         self._retrieval_log = opened.enter_context(
@@ -156,7 +158,8 @@ class Session(Closeable):
         self._announcer.add_listener(event_log.write)
         self._snapshots = Snapshots(self.output / "sparse", self.options.snapshot_seconds)
         self.num_restored = self.database.num_photos()
-        self._announcer.tell(SessionStarted(VERSION, as_dict(self.options), self.num_restored))
+        options = as_dict(self.options)
+        self._announcer.tell(SessionStarted(VERSION, options, self.num_restored, command))
         mark_running(self.database, self.options)
         self._restore(event_log, is_known=known)
 
@@ -234,8 +237,8 @@ class Session(Closeable):
         self._write_snapshot_if_due()
         return added
 
-    def finish(self) -> SessionResult:
-        """Place what can still be placed, refine, and export all models."""
+    def finish(self, num_left: int = 0) -> SessionResult:
+        """Place what can still be placed, refine, export; ``num_left`` photos are not taken."""
         if self._finished:
             raise RuntimeError("the session is finished already")
         self._finished = True
@@ -285,7 +288,7 @@ class Session(Closeable):
         remove_working_folder(self.output)
         totals = summary.totals
         self._announcer.tell(
-            SessionEnded(True, totals.num_used, totals.num_registered, len(models))
+            SessionEnded(True, totals.num_used, totals.num_registered, len(models), num_left)
         )
         return SessionResult(tuple(models), summary)
 
@@ -293,13 +296,11 @@ class Session(Closeable):
         """End; without ``finish``, the same session can be gone on with."""
         if not self._finished:
             self._finished = True
-            num_registered = len(self._parts.atlas.registered)
-            num_models = len(self._parts.atlas.models)
+            atlas, num_photos = self._parts.atlas, len(self._parts.catalog)
+            ended = SessionEnded(False, num_photos, len(atlas.registered), len(atlas.models))
             # The disk may be full, or the output gone: that was told when it was met.
             with suppress(StorageError):
-                self._announcer.tell(
-                    SessionEnded(False, len(self._parts.catalog), num_registered, num_models)
-                )
+                self._announcer.tell(ended)
         self._opened.close()
 
     def _georeference(self) -> None:

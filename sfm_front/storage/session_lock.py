@@ -1,9 +1,10 @@
-"""One writer per output folder."""
+"""One writer per output folder; whether there is one."""
 
 from __future__ import annotations
 
 import os
 import socket
+import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +16,39 @@ from sfm_front.runtime.closeable import Closeable
 LOCK = ".sfm_front.lock"
 OWNER = ".sfm_front.owner"
 
+_PATIENCE_S = 0.1
+
+
+def is_locked(output: Path) -> bool:
+    """Whether a process writes to the folder right now, as far as can be told.
+
+    Never in the way of one that begins at this moment: a lock that is only tried is shared, and a
+    session waits for it.
+    """
+    try:
+        with (output / LOCK).open("rb") as file:
+            return not _is_free(file.fileno())
+    except FileNotFoundError:
+        return False
+    except OSError:  # On some network drives there are no locks.
+        return True
+
+
+def _is_free(descriptor: int) -> bool:
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+            msvcrt.locking(descriptor, msvcrt.LK_UNLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True
+
 
 class SessionLock(Closeable):
     """Held while a session writes to a folder. The system frees the lock of a killed process."""
@@ -24,7 +58,8 @@ class SessionLock(Closeable):
         self._output = output
         self._lock = FileLock(output / LOCK)
         try:
-            self._lock.acquire(timeout=0)
+            # Longer than anybody takes who only looks whether it is held.
+            self._lock.acquire(timeout=_PATIENCE_S, poll_interval=_PATIENCE_S / 10)
         except Timeout:
             raise InputError(
                 f"{output}: {self._owner()} is writing to it. Wait for it, or give another "

@@ -11,6 +11,8 @@ import pycolmap
 import pytest
 from helpers.reconstructing import after_photo, interrupt_after, reconstruct
 
+from sfm_front.errors import StorageError
+
 pytestmark = pytest.mark.slow
 
 
@@ -28,6 +30,8 @@ def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypa
     assert [row["name"] for row in report["photos"]] == [f"{n:04d}.jpg" for n in range(1, 5)]
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
     assert model.num_reg_images() == report["totals"]["registered"] >= 3
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "finished without 1 photo to go. To go on: <code>sfm-front reconstruct" in page
     assert signal.getsignal(number) is handler
 
 
@@ -39,6 +43,17 @@ def test_ctrl_c_before_there_is_a_model_is_status_1(five, tmp_path, monkeypatch,
     left = {path.name for path in (tmp_path / "out" / "sparse").iterdir()}
     assert left == {"session.json", "georeference.json"}
     assert (tmp_path / "out" / "report.json").exists()
+
+
+def test_what_ends_by_an_error_has_a_page_that_says_so(five, tmp_path, monkeypatch):
+    def fail() -> None:
+        raise StorageError("database.db: disk I/O error")
+
+    after_photo(monkeypatch, "0003.jpg", fail)
+    assert reconstruct(five, tmp_path / "out") == 2
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "before its end." in page
+    assert "To go on: <code>sfm-front reconstruct" in page
 
 
 def test_a_photo_that_is_deleted_before_it_is_read_is_named(five, tmp_path, monkeypatch, capsys):

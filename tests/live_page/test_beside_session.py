@@ -42,7 +42,7 @@ def test_it_tells_its_address_and_ends_when_nobody_looks(tmp_path):
     assert page._process.returncode == 0
 
 
-def test_it_ends_with_its_session(tmp_path):
+def test_it_ends_with_its_session_where_nobody_looks(tmp_path):
     said: list[str] = []
     with PageBesideSession(tmp_path / "out", said.append, 18280) as page:
         wait_for(lambda: len(said) == 1)

@@ -14,8 +14,10 @@ from helpers.positioned_stream import options
 
 from sfm_front.exporters.colmap import export_models
 from sfm_front.live_page.follower import OutputFollower
+from sfm_front.reports.standing import Standing
 from sfm_front.reports.story import PhotoState
 from sfm_front.session.session import Session
+from sfm_front.storage.session_lock import SessionLock
 
 NUM_PHOTOS = 12
 POSITIONS = {"num_used": 5, "num_positions": 5, "scale_sigma": 0.1, "origin": [1, 2, 3]}
@@ -159,6 +161,20 @@ def test_few_links_are_weak(tmp_path):
     write_models(tmp_path / "out", model_of(names(5)))
     weak = [one.photo.name for one in OutputFollower(tmp_path / "out").look().weak]
     assert weak == ["4.jpg"]
+
+
+def test_a_killed_session_is_noticed_though_it_tells_nothing(tmp_path):
+    output = tmp_path / "out"
+    options = {"second_look": {"min_pairs": 3}}
+    Log(output, ago_s=60).tell("session_started", options=options, num_photos=0)
+    follower = OutputFollower(output)
+    with SessionLock(output):
+        assert follower.look().standing is Standing.RUNS
+        assert follower.look() is None
+    assert follower.look().standing is Standing.BROKEN_OFF
+    assert follower.look() is None
+    with SessionLock(output):  # It goes on.
+        assert follower.look().standing is Standing.RUNS
 
 
 def test_damaged_events_are_passed_over(tmp_path):

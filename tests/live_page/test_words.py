@@ -12,14 +12,15 @@ from sfm_front.live_page import photo_words, words
 from sfm_front.live_page.follower import Outcome, Seen
 from sfm_front.reports.event_words import in_words
 from sfm_front.reports.lights import Level
+from sfm_front.reports.standing import Standing
 from sfm_front.reports.story import PhotoState, PhotoStory, Story
 from sfm_front.reports.verdict import Verdict
 
 
-def seen(*, ended: bool | None = None, **counts: int) -> Seen:
+def seen(stands: Standing = Standing.RUNS, **counts: int) -> Seen:
     """So many photos in each state, with hostile names."""
     story, outcomes = Story(), {}
-    story.began, story.last, story.ended = 1000.0, 1090.0, ended
+    story.began, story.last = 1000.0, 1090.0
     for state in PhotoState:
         for number in range(counts.get(state.name, 0)):
             name = f"{state.name} {number} {HOSTILE}"
@@ -30,7 +31,7 @@ def seen(*, ended: bool | None = None, **counts: int) -> Seen:
             )
             story.newest = photo
             story.lines.append((1000.0, HOSTILE))
-    return Seen(story, [], [], outcomes)
+    return Seen(story, [], [], outcomes, standing=stands)
 
 
 def text_of(markup: str) -> str:
@@ -74,15 +75,31 @@ def test_the_headline_counts():
 
 
 @pytest.mark.parametrize(
-    ("ended", "now", "expected"),
+    ("stands", "now", "expected"),
     [
-        (True, 1092.0, "finished after 1:30"),
-        (False, 1092.0, "stopped after 1:30"),
-        (None, 1400.0, "running , nothing new for 5:10"),
+        (Standing.FINISHED, 1092.0, "finished after 1:30"),
+        (Standing.STOPPED, 1092.0, "stopped after 1:30 the same command goes on"),
+        (Standing.RUNS, 1400.0, "running , nothing new for 5:10"),
+        (
+            Standing.BROKEN_OFF,
+            1400.0,
+            "broken off after 1:30: nothing heard for 5:10, no process here works on it",
+        ),
     ],
 )
-def test_the_headline_says_how_it_stands(ended, now, expected):
-    assert expected in " ".join(text_of(words.headline(seen(ended=ended), now)).split())
+def test_the_headline_says_how_it_stands(stands, now, expected):
+    assert expected in " ".join(text_of(words.headline(seen(stands), now)).split())
+
+
+def test_of_a_stopped_session_it_says_what_is_left_and_what_goes_on():
+    what = seen(Standing.STOPPED, ARRIVED=2)
+    what.story.num_left, what.story.command = 7, f"sfm-front reconstruct '{HOSTILE}'"
+    markup = words.headline(what)
+    text = " ".join(text_of(markup).split())
+    assert "stopped after 1:30 with 7 photos to go to go on: sfm-front reconstruct" in text
+    assert "to come" not in text
+    assert "<img" not in markup
+    assert "\x1b" not in markup
 
 
 def test_the_headline_names_the_step_of_the_end():
@@ -94,7 +111,7 @@ def test_the_headline_names_the_step_of_the_end():
 
 @pytest.mark.parametrize("level", [Level.GOOD, Level.FAIR, Level.BAD])
 def test_the_verdict_is_text(level):
-    judged = replace(seen(ended=True), verdict=Verdict(level, f"All are in. {HOSTILE}"))
+    judged = replace(seen(Standing.FINISHED), verdict=Verdict(level, f"All are in. {HOSTILE}"))
     markup = words.headline(judged)
     assert "All are in." in text_of(markup)
     assert "<img" not in markup
@@ -117,6 +134,17 @@ def test_long_lists_keep_what_is_not_placed():
                 "num_registered": [8, 1],
             },
             "model 2 (1 photo) joined to model 1 (8)",
+        ),
+        (
+            {
+                "event": "session_ended",
+                "finished": True,
+                "num_photos": 3,
+                "num_registered": 2,
+                "num_models": 1,
+                "num_left": 1,
+            },
+            "stopped with 1 photo to go, finished: 2 of 3 photos in 1 model",
         ),
         (
             {"event": "session_ended", "finished": False},

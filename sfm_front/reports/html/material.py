@@ -27,8 +27,9 @@ class Material:
     ``files``: where photos are, those that were skipped, too, by name. ``has_scene``: whether the
     models to turn lie beside the page. ``began``: day and hour in
     UTC; ``version`` of the program that reconstructed. Both empty where nothing says so.
-    ``so_far``: how far a session is that has not ended, empty of one that has; ``observed``: what
-    its models see, by their numbers, for their files may be replaced.
+    ``how_it_stands``: of a session that has not ended, or was stopped; empty of any other.
+    ``command``: what goes on with it, empty where that is not known.
+    ``observed``: what its models see, by their numbers, for their files may be replaced.
     """
 
     output: Path
@@ -40,7 +41,10 @@ class Material:
     has_scene: bool = False
     began: str = ""
     version: str = ""
-    so_far: str = ""
+    how_it_stands: str = ""
+    command: str = ""
+    is_finished: bool = True
+    is_running: bool = False
     observed: Mapping[int, Observations] = field(default_factory=dict)
 
     @property

@@ -20,11 +20,12 @@ from sfm_front.reports.html.material import Material
 from sfm_front.reports.html.observations import observations_of
 from sfm_front.reports.report_json import read_report
 from sfm_front.reports.run_summary import RunSummary
+from sfm_front.reports.standing import Standing, read_story, standing
 from sfm_front.reports.story import Story
 from sfm_front.reports.unfinished import (
     Moment,
-    story_if_unfinished,
     sum_up_so_far,
+    words_of_stopped,
     words_so_far,
 )
 from sfm_front.storage.colmap_models import read_model
@@ -42,16 +43,19 @@ def read_material(output: Path, photos: Path | None = None) -> Material:
     Raises InputError if ``output`` is not that of a session, a file of it cannot be read, or there
     is no such folder.
     """
-    story = story_if_unfinished(output)
-    if story is not None:
+    story = read_story(output)
+    if story.is_unfinished:
         return _material_so_far(output, story, photos)
     summary = read_report(output)
     models = [read_model(output / model.path) for model in summary.models]
-    return _material(output, summary, models, read_stored_session(output / DATABASE), photos)
+    session = read_stored_session(output / DATABASE)
+    material = _material(output, summary, models, session, photos)
+    return replace(material, how_it_stands=words_of_stopped(story), command=story.command)
 
 
 def _material_so_far(output: Path, story: Story, photos: Path | None) -> Material:
     """Of a session that may be writing meanwhile: all of its models as of one moment."""
+    stands = standing(story, output)
     for _ in range(_TRIES):
         with suppress(OSError, ValueError, KeyError, TypeError, InputError):
             moment = Moment.of(output)
@@ -64,7 +68,10 @@ def _material_so_far(output: Path, story: Story, photos: Path | None) -> Materia
             if Moment.of(output) == moment:
                 return replace(
                     material,
-                    so_far=words_so_far(story, moment),
+                    how_it_stands=words_so_far(story, stands, moment),
+                    command=story.command,
+                    is_finished=False,
+                    is_running=stands is Standing.RUNS,
                     observed=dict(enumerate(observed)),
                 )
         time.sleep(_PAUSE_S)

@@ -67,7 +67,7 @@ def as_page(material: Material) -> str:
         tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", name="color-scheme", content="light dark"),
-        tag("meta", http_equiv="refresh", content=_RELOAD_S) if material.so_far else None,
+        tag("meta", http_equiv="refresh", content=_RELOAD_S) if material.is_running else None,
         tag("title", title),
         tag("style", Html(_STYLE.read_text(encoding="utf-8"))),
     )
@@ -82,7 +82,7 @@ def _first_screen(material: Material, found: list[Light], model: Html | None) ->
         "header",
         tag("p", _origin(material), class_="origin"),
         tag("h1", material.name),
-        tag("p", material.so_far, class_="so-far") if material.so_far else None,
+        _how_it_stands(material),
         tag("p", _sentence(material), class_="verdict"),
         _figures(material),
         tag(
@@ -94,8 +94,15 @@ def _first_screen(material: Material, found: list[Light], model: Html | None) ->
     )
 
 
+def _how_it_stands(material: Material) -> Html | None:
+    words, command = material.how_it_stands, material.command
+    if not words:
+        return None
+    return tag("p", words, " ", tag("code", command) if command else None, class_="so-far")
+
+
 def _sentence(material: Material) -> str:
-    if material.so_far and not material.models:
+    if not (material.is_finished or material.models):
         return "There is no model yet."
     return verdict(material.summary, material.sidecar).sentence
 

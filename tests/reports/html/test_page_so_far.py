@@ -72,7 +72,34 @@ def test_before_the_first_model_is_written_there_is_a_page(tmp_path, photos):
 
 def test_a_session_that_was_stopped_is_said_to_be(tmp_path, photos):
     page = text_of(run_session(tmp_path / "out", iter(photos[:4]), finish=False))
-    assert "before its end: the same command goes on" in page
+    assert "before its end. The same command goes on" in page
+    assert "Not finished" not in page
+    assert '<meta http-equiv="refresh"' not in page
+
+
+def test_a_session_that_was_killed_is_said_to_be(tmp_path, photos, monkeypatch):
+    output = tmp_path / "out"
+    run_session(output, iter(photos[:4]), finish=False)
+    log = output / "events.jsonl"
+    log.write_text("".join(log.read_text().splitlines(keepends=True)[:-1]))
+    monkeypatch.setattr("sfm_front.reports.standing._SILENT_S", 0.0)
+    page = text_of(output)
+    assert "Broken off: nothing was heard after" in page
+    assert "Not finished" not in page
+    assert '<meta http-equiv="refresh"' not in page
+
+
+def test_one_that_was_stopped_and_finished_says_what_is_left(tmp_path, photos):
+    output = tmp_path / "out"
+    command = "sfm-front reconstruct '<script>'"
+    with Session(output, options(), command=command) as session:
+        for photo in photos[:5]:
+            session.add_extracted(photo)
+        session.finish(num_left=3)
+    page = text_of(output)
+    assert "and finished without 3 photos to go. To go on: <code>sfm-front reconstruct" in page
+    assert "<script" not in page
+    assert "All 5 photos are in one model" in page
 
 
 def test_one_that_goes_on_is_not_shown_as_it_ended_before(tmp_path, photos):

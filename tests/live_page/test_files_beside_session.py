@@ -10,8 +10,8 @@ import pytest
 from helpers.live_session import orbit, photos_of
 from helpers.positioned_stream import options
 
-from sfm_front.reports.html import beside_session
-from sfm_front.reports.html.beside_session import ReportBesideSession
+from sfm_front.live_page import files_beside_session as beside_session
+from sfm_front.live_page.files_beside_session import FilesBesideSession
 from sfm_front.session.session import Session
 
 PATIENCE_S = 60.0
@@ -30,7 +30,7 @@ def test_the_page_follows_the_models(tmp_path, monkeypatch):
     output = tmp_path / "out"
     page = output / "report.html"
     photos = photos_of(orbit(24), tmp_path / "photos")
-    with Session(output, options()) as session, ReportBesideSession(output, every_s=0.05):
+    with Session(output, options()) as session, FilesBesideSession(output, every_s=0.05):
         for photo in islice(photos, 6):
             session.add_extracted(photo)
         session._write_snapshot()
@@ -83,7 +83,7 @@ def write_models(output, number: int) -> None:
 def test_without_new_models_nothing_is_written(output, monkeypatch):
     processes = Processes(monkeypatch)
     write_models(output, 1)
-    with closing(ReportBesideSession(output, every_s=0.02)):
+    with closing(FilesBesideSession(output, every_s=0.02)):
         time.sleep(0.2)
         assert not processes.began
         write_models(output, 2)
@@ -95,7 +95,7 @@ def test_without_new_models_nothing_is_written(output, monkeypatch):
 def test_a_page_that_takes_long_comes_seldom(output, monkeypatch):
     processes = Processes(monkeypatch, spent_s=0.1)
     monkeypatch.setattr(beside_session, "_MAX_SHARE", 0.2)
-    with closing(ReportBesideSession(output, every_s=0.02)):
+    with closing(FilesBesideSession(output, every_s=0.02)):
         number = 0
         while len(processes.began) < 3:
             write_models(output, number := number + 1)
@@ -105,7 +105,7 @@ def test_a_page_that_takes_long_comes_seldom(output, monkeypatch):
 
 def test_at_the_end_it_leaves_at_once_and_without_a_trace(output, monkeypatch):
     processes = Processes(monkeypatch, 1e6)
-    report = ReportBesideSession(output, every_s=0.02)
+    report = FilesBesideSession(output, every_s=0.02)
     write_models(output, 1)
     wait_for(lambda: processes.began)
     (output / ".report.html.abcd1234").touch()

@@ -1,4 +1,5 @@
-"""Keep ``report.html`` fresh while a session runs, by processes that step back behind it."""
+"""Keep ``report.html`` and ``scene.html`` fresh while a session runs, by processes that step back
+behind it."""
 
 from __future__ import annotations
 
@@ -8,20 +9,20 @@ from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
 
-from sfm_front.reports.html import FILE
+from sfm_front.reports.html import FILE, SCENE_FILE
 from sfm_front.runtime.closeable import Closeable
 from sfm_front.runtime.subprocess_env import module_command, module_environment
 from sfm_front.storage.atomic import is_partial
 from sfm_front.storage.written_models import STATE
 
 _EVERY_S = 30.0
-# Of a large session the page takes long: it gets at most this share of a processor's time.
+# Of a large session they take long: they get at most this share of a processor's time.
 _MAX_SHARE = 0.02
 _TICK_S = 0.5
 
 
-class ReportBesideSession(Closeable):
-    """Writes the page of ``output`` anew when models have been written since the last time."""
+class FilesBesideSession(Closeable):
+    """Writes the files of ``output`` anew when models have been written since the last time."""
 
     def __init__(self, output: Path, every_s: float = _EVERY_S) -> None:
         """Begins ``every_s`` from now, and leaves as much time between any two."""
@@ -46,7 +47,7 @@ class ReportBesideSession(Closeable):
                 continue
             self._shown, began_s = written, time.monotonic()
             spent_s = 0.0
-            # Without processes to be had, the page comes at the end.
+            # Without processes to be had, they come at the end.
             with suppress(OSError):
                 spent_s = self._write()
             wanted_s = max(self._every_s, spent_s / _MAX_SHARE)
@@ -62,7 +63,7 @@ class ReportBesideSession(Closeable):
     def _write(self) -> float:
         """Or leave it, where there is no time left; the seconds of a processor that it took."""
         process = subprocess.Popen(
-            module_command("sfm_front.reports.html.page_process", str(self._output)),
+            module_command("sfm_front.live_page.files_process", str(self._output)),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -83,5 +84,5 @@ class ReportBesideSession(Closeable):
     def _remove_partial(self) -> None:
         with suppress(OSError):
             for file in self._output.iterdir():
-                if is_partial(file.name, FILE):
+                if is_partial(file.name, FILE) or is_partial(file.name, SCENE_FILE):
                     file.unlink()

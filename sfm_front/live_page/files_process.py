@@ -1,4 +1,5 @@
-"""Writes ``report.html`` beside a session that goes on: OUTPUT; ``beside_session`` runs it.
+"""Writes the files to look at beside a session that goes on: OUTPUT; ``files_beside_session`` runs
+it.
 
 It prints the seconds of processor time that this took.
 """
@@ -10,17 +11,17 @@ import time
 import zlib  # noqa: F401  (before pycolmap)
 from pathlib import Path
 
-from sfm_front.reports.html.page import write_page
+from sfm_front.live_page.files import write_files
 from sfm_front.runtime.priority import let_others_first
 
-# Whatever the session leaves: nobody waits for this page.
+# Whatever the session leaves: nobody waits for these files.
 _NICE = 19
 
 
 def main(output: Path) -> None:
-    """Write the page once."""
+    """Write them once."""
     let_others_first(_NICE)
-    write_page(output)
+    write_files(output)
     print(time.process_time())
 
 
