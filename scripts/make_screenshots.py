@@ -1,7 +1,7 @@
 """Make the guides' pictures of the live page and the report: python scripts/make_screenshots.py.
 
 FOLDER holds photos (default: the sample). Needs the extra test and the system's Chromium, which
-draws by the processor. Takes half a minute on two cores.
+draws by the processor. Takes a minute on two cores.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from sample_scene.strangers import add_strangers
 
+ROOT = Path(__file__).resolve().parents[1]
 _CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 _FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--ignore-gpu-blocklist")
 _SIZE = {"width": 1400, "height": 860}
 _QUALITY = 82
+_MARGIN_PX = 14
 # While a session runs: once so many of its photos are placed.
 _SHARE_PLACED = 0.7
 
@@ -57,7 +58,22 @@ def main() -> int:
         report = browser.new_page(viewport=_SIZE, color_scheme="light")
         report.goto((output / "report.html").as_uri())
         _take(report, arguments.out / "report.jpg")
+        _take_part(report, arguments.out / "report_map.jpg", "#map > .columns")
+        _show_unplaced(browser, arguments.folder, Path(folder), arguments.out)
     return 0
+
+
+def _show_unplaced(browser: Any, photos: Path, folder: Path, out: Path) -> None:
+    """What the report has of photos without a place, of which the sample has none of its own."""
+    mixed, output = folder / "mixed", folder / "mixed_output"
+    shutil.copytree(photos, mixed)
+    add_strangers(mixed)
+    script = [sys.executable, str(ROOT / "scripts" / "reconstruct.py"), str(mixed)]
+    subprocess.run([*script, "--output", str(output), "--quiet"], check=True)
+    report = browser.new_page(viewport=_SIZE, color_scheme="light", device_scale_factor=2)
+    report.goto((output / "report.html").as_uri())
+    report.add_style_tag(content="h3 { width: max-content }")  # Else it is as wide as the page.
+    _take_part(report, out / "report_unplaced.jpg", "#unplaced h3, #unplaced .card")
 
 
 @contextmanager
@@ -111,6 +127,17 @@ def _choose_photo(tab: Any, place: int) -> None:
 def _take(tab: Any, file: Path) -> None:
     _close_notes(tab)
     tab.screenshot(path=file, type="jpeg", quality=_QUALITY)
+    print(f"wrote {file}: {file.stat().st_size / 1000:.0f} kB")
+
+
+def _take_part(page: Any, file: Path, selector: str) -> None:
+    """All that is selected, with a margin."""
+    boxes = [one.bounding_box() for one in page.locator(selector).all()]
+    left, top = (min(box[side] for box in boxes) - _MARGIN_PX for side in ("x", "y"))
+    right = max(box["x"] + box["width"] for box in boxes) + _MARGIN_PX
+    bottom = max(box["y"] + box["height"] for box in boxes) + _MARGIN_PX
+    part = {"x": left, "y": top, "width": right - left, "height": bottom - top}
+    page.screenshot(path=file, type="jpeg", quality=_QUALITY, full_page=True, clip=part)
     print(f"wrote {file}: {file.stat().st_size / 1000:.0f} kB")
 
 

@@ -235,6 +235,8 @@ class Waiting:
     def __str__(self) -> str:
         if self.num_seen is None:
             return self.reason.value
+        if not self.num_seen:
+            return "it sees no point of a model"
         return f"no pose fits the {self.num_seen} model points it sees"
 
 

@@ -104,8 +104,8 @@ def words_of_stopped(story: Story) -> str:
     if not story.num_left:
         return ""
     left = counted(story.num_left, "photo")
-    go_on = capitalized(how_to_go_on(story))
-    return f"Stopped at {day_and_hour(story.last)}, and finished without {left} to go. {go_on}"
+    words = f"Stopped at {day_and_hour(story.last)} with {left} to go, finished with the others."
+    return f"{words} {capitalized(how_to_go_on(story))}"
 
 
 def _how_it_stands(story: Story, stands: Standing) -> str:

@@ -31,7 +31,7 @@ def test_a_signal_finishes_with_the_photos_taken_so_far(five, tmp_path, monkeypa
     model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
     assert model.num_reg_images() == report["totals"]["registered"] >= 3
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "finished without 1 photo to go. To go on: <code>sfm-front reconstruct" in page
+    assert "with 1 photo to go, finished with the others. To go on: <code>" in page
     assert signal.getsignal(number) is handler
 
 

@@ -11,6 +11,7 @@ from helpers.live_session import orbit, photos_of
 from helpers.positioned_stream import options
 
 from sfm_front.live_page import files_beside_session as beside_session
+from sfm_front.live_page.extra import is_installed
 from sfm_front.live_page.files_beside_session import FilesBesideSession
 from sfm_front.session.session import Session
 
@@ -36,6 +37,7 @@ def test_the_page_follows_the_models(tmp_path, monkeypatch):
         session._write_snapshot()
         wait_for(page.exists)
         assert "Not finished yet" in page.read_text(encoding="utf-8")
+        assert (output / "scene.html").exists() == is_installed()
         session.add_extracted(next(photos))
         session._write_snapshot()
         wait_for(lambda: "7 / 7" in page.read_text(encoding="utf-8"))

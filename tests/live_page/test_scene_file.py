@@ -6,10 +6,12 @@ from importlib import metadata
 
 import pytest
 from helpers.live_session import orbit, photos_of, run_session
+from helpers.positioned_stream import options
 
 from sfm_front.cli.main import main
 from sfm_front.errors import InputError
 from sfm_front.live_page.extra import is_installed, scene_if_possible
+from sfm_front.session.session import Session
 
 needs_viser = pytest.mark.skipif(not is_installed(), reason="needs viser: pip install viser")
 
@@ -32,6 +34,30 @@ def test_the_report_command_writes_it_beside_the_page(tmp_path, capsys):
     run = ["reconstruct", str(tmp_path / "photos"), "--output", str(output), "--overwrite"]
     main([*run, "--max-features", "50", "--global-descriptor", "vlad"])
     assert not (output / "scene.html").exists()
+
+
+@needs_viser
+@pytest.mark.parametrize(
+    ("finish", "says"),
+    [(True, "finished at"), (False, "stopped at"), (None, "as far as it was at")],
+)
+def test_it_says_of_when_it_is(tmp_path, finish, says):
+    from sfm_front.live_page.scene_file import write_scene
+
+    output = tmp_path / "<b>"
+    with Session(output, options()) as session:
+        for photo in photos_of(orbit(8), tmp_path / "photos"):
+            session.add_extracted(photo)
+        session._write_snapshot()
+        if finish:
+            session.finish()
+        elif finish is None:
+            write_scene(output)
+    if finish is not None:
+        write_scene(output)
+    page = (output / "scene.html").read_text(encoding="utf-8")
+    assert f"points, {says} " in page
+    assert "&lt;b&gt;: 8 photos" in page
 
 
 @needs_viser

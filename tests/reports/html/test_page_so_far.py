@@ -97,7 +97,7 @@ def test_one_that_was_stopped_and_finished_says_what_is_left(tmp_path, photos):
             session.add_extracted(photo)
         session.finish(num_left=3)
     page = text_of(output)
-    assert "and finished without 3 photos to go. To go on: <code>sfm-front reconstruct" in page
+    assert "with 3 photos to go, finished with the others. To go on: <code>" in page
     assert "<script" not in page
     assert "All 5 photos are in one model" in page
 
