@@ -46,7 +46,7 @@ def test_it_says_of_when_it_is(tmp_path, finish, says):
 
     output = tmp_path / "<b>"
     with Session(output, options()) as session:
-        for photo in photos_of(orbit(8), tmp_path / "photos"):
+        for photo in photos_of(orbit(12), tmp_path / "photos"):
             session.add_extracted(photo)
         session._write_snapshot()
         if finish:
@@ -57,7 +57,7 @@ def test_it_says_of_when_it_is(tmp_path, finish, says):
         write_scene(output)
     page = (output / "scene.html").read_text(encoding="utf-8")
     assert f"points, {says} " in page
-    assert "&lt;b&gt;: 8 photos" in page
+    assert "&lt;b&gt;: 12 photos" in page
 
 
 @needs_viser
