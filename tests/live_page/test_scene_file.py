@@ -57,7 +57,7 @@ def test_it_says_of_when_it_is(tmp_path, finish, says):
         write_scene(output)
     page = (output / "scene.html").read_text(encoding="utf-8")
     assert f"points, {says} " in page
-    assert "&lt;b&gt;: 12 photos" in page
+    assert ">&lt;b&gt;: 1" in page
 
 
 @needs_viser
