@@ -16,6 +16,7 @@ from sfm_front.cli.progress import CountLine
 from sfm_front.cli.signals import leaving_at_signal
 from sfm_front.cli.terminal import printable
 from sfm_front.exporters.registry import TARGETS, export
+from sfm_front.reports.words import one_line
 
 _EXIT_STATUS = """\
 exit status: 0 the folder was written, 2 a mistake in what was given, 130 stopped, and nothing is
@@ -105,5 +106,5 @@ def run(arguments: argparse.Namespace) -> int:
     lines = [f"{exported.folder}: {exported.num_photos} photos, {exported.num_points} points"]
     if not arguments.quiet:
         lines += [*exported.notes, f"next: {next_step}"]
-    print(printable("\n".join(lines)))
+    print(printable("\n".join(map(one_line, lines))))
     return 0

@@ -16,6 +16,7 @@ from sfm_front.cli.signals import INTERRUPTED
 from sfm_front.cli.streams import unfailing_streams
 from sfm_front.cli.terminal import printable
 from sfm_front.errors import SfmFrontError
+from sfm_front.reports.words import one_line
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -60,7 +61,7 @@ def _run(arguments: argparse.Namespace) -> int:
         with logging_to(arguments.verbose, arguments.log_file):
             return run(arguments)
     except SfmFrontError as error:
-        print(printable(f"sfm-front {arguments.command}: {error}"), file=sys.stderr)
+        print(printable(one_line(f"sfm-front {arguments.command}: {error}")), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)

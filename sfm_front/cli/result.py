@@ -27,7 +27,7 @@ def tell_result(
         return
     first, *details = closing_summary(
         summary, output, watched=arguments.watch, with_stages=arguments.verbose > 0
-    ).splitlines()
+    ).split("\n")
     level = verdict(summary, summary.sidecar).level
     print(painted(printable(first), level, spoken), file=spoken)
     if not arguments.quiet:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
+from sfm_front.reports.words import one_line
 from sfm_front.search.folder_search import Answer, Found, VerifiedMatches
 from sfm_front.types import ExtractedPhoto
 
@@ -28,7 +29,7 @@ def table(answer: Answer, relevant: Collection[str] | None, count: int) -> str:
         lines.append(
             f"{rank:>4}  {found.photo.name:<{width}}  {found.cosine:>7.4f}  {inliers:>7}{mark}"
         )
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def rows(answers: Sequence[Answer]) -> list[dict[str, Any]]:

@@ -29,7 +29,8 @@ _SMALL = "font-size:.75em;opacity:.72"
 def headline(seen: Seen, now: float | None = None) -> Html:
     """How far the session is, in figures; ``now``: seconds since 1970."""
     placed = seen.named(PhotoState.PLACED)
-    taken = [one for one in seen.outcomes.values() if one.state is not PhotoState.ARRIVED]
+    not_taken = (PhotoState.ARRIVED, PhotoState.SKIPPED)
+    taken = [one for one in seen.outcomes.values() if one.state not in not_taken]
     num_points = sum(shape.num_points for shape in seen.models)
     tiles = [
         _tile(f"{len(placed)} / {len(taken)}", "photos placed"),

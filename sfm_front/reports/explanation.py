@@ -18,6 +18,7 @@ from sfm_front.reports.position_explanation import position_in_words
 from sfm_front.reports.report_json import read_report
 from sfm_front.reports.retrieval_log import read_candidates
 from sfm_front.reports.run_summary import Outcome, RunSummary
+from sfm_front.reports.words import one_line
 from sfm_front.storage.colmap_models import read_model
 from sfm_front.storage.database import DATABASE, PhotoDatabase
 from sfm_front.types import CandidateOutcome, Features, Float64Array, Skipped, Uint32Array, View
@@ -86,7 +87,7 @@ class Explanation:
         if self.others:
             lines.append("verified with others, that came later or on a second look (inliers):")
             lines += [f"  {name}  {inliers}" for name, inliers in self.others.items()]
-        return "\n".join(lines)
+        return "\n".join(map(one_line, lines))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

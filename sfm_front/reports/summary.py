@@ -10,7 +10,7 @@ from sfm_front.reports.camera_outcome import camera_warnings
 from sfm_front.reports.cluster_outcome import ClusterOutcome
 from sfm_front.reports.control_words import control_lines
 from sfm_front.reports.run_summary import AuditOutcome, RunSummary, Totals
-from sfm_front.reports.words import clock, counted
+from sfm_front.reports.words import clock, counted, one_line
 
 # Photos of a doubtful group; report.json names all.
 _MOST_NAMED = 5
@@ -68,7 +68,7 @@ def closing_summary(
         )
     if with_stages:
         lines += _stages(totals)
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def _cluster(cluster: ClusterOutcome) -> list[str]:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime, timezone
 
 _MONTHS = (
     *("January", "February", "March", "April", "May", "June"),
     *("July", "August", "September", "October", "November", "December"),
 )
+
+
+_ENDS_OF_LINES = re.compile("[\n\r\x0b\x0c\x1c-\x1e\x85\u2028\u2029]")
+
+
+def one_line(text: str) -> str:
+    """With ends of lines spelled out: a photo may be called so that it seems to say something of
+    its own."""
+    return _ENDS_OF_LINES.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
 
 
 def counted(count: int, noun: str) -> str:

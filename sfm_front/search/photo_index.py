@@ -53,7 +53,7 @@ class Update:
             told += f", {self.removed} gone"
         if self.skipped:
             told += f", {len(self.skipped)} skipped"
-        return f"index rebuilt: {self.discarded}\n{told}" if self.discarded else told
+        return f"index rebuilt: {self.discarded}; {told}" if self.discarded else told
 
 
 class PhotoIndex(Mapping[int, View]):

@@ -210,9 +210,9 @@ def test_quiet_leaves_only_what_must_be_mended():
 
 def test_no_name_of_a_photo_moves_the_cursor():
     stream = Terminal()
-    ProgressLine(stream).show(Skipped("a\x1b[2J\x1b]0;title\x07\r.jpg", SkipReason.EMPTY_FILE))
+    ProgressLine(stream).show(Skipped("a\x1b[2J\x1b]0;title\x07\r\nb.jpg", SkipReason.EMPTY_FILE))
     assert (
         stream.getvalue()
         .replace(ERASE, "")
-        .startswith("skipped a\\x1b[2J\\x1b]0;title\\x07\\x0d.jpg: empty file\n")
+        .startswith("skipped a\\x1b[2J\\x1b]0;title\\x07\\x0d\\x0ab.jpg: empty file\n")
     )

@@ -66,7 +66,9 @@ def test_figures_of_one_photo_are_text():
 
 
 def test_the_headline_counts():
-    text = " ".join(text_of(words.headline(seen(PLACED=3, WAITING=2, ARRIVED=4), 1092.0)).split())
+    text = " ".join(
+        text_of(words.headline(seen(PLACED=3, WAITING=2, ARRIVED=4, SKIPPED=1), 1092.0)).split()
+    )
     assert "running for 1:32" in text
     assert "3 / 5 photos placed" in text
     assert "2 photos waiting" in text

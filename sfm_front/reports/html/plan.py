@@ -116,7 +116,8 @@ def _arrows(
     longest = 5 * share * sheet.width * sheet.unit
     shown = residuals * times * np.minimum(1, longest / np.maximum(lengths, 1e-12))
     lines = zip(sheet.pixels(starts).tolist(), sheet.pixels(starts + shown).tolist(), strict=True)
-    words = f" Arrows point to the measured positions, {times:g} times as long as they are."
+    enlarged = f", {times:g} times as long as they are" if times > 1 else ""
+    words = f" Arrows point to the measured positions{enlarged}."
     return tag("g", _paths(lines), class_="arrows"), words
 
 
