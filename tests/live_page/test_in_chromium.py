@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Iterator
 from threading import Event, Thread
 from typing import Any
@@ -13,9 +14,11 @@ from helpers.browser import Tab, chromium, needs_chromium
 from helpers.live_session import HOSTILE, orbit, photos_of, run_session
 from helpers.positioned_stream import options
 
+from sfm_front.live_page.beside_session import PageBesideSession
 from sfm_front.reports.html.markup import visible
 from sfm_front.session import snapshots
 from sfm_front.session.session import Session
+from sfm_front.storage.session_lock import SessionLock
 
 NUM_PHOTOS = 10
 NAMES = {3: HOSTILE}
@@ -225,3 +228,24 @@ def test_a_session_is_followed_while_it_runs(browser, tmp_path, monkeypatch):
     assert tab.complaints == []
     tab.close()
     served.close()
+
+
+def test_whoever_looks_reads_that_a_session_was_killed(browser, tmp_path):
+    output = tmp_path / "out"
+    run_session(output, photos_of(orbit(6), tmp_path / "photos"), finish=False)
+    log = output / "events.jsonl"
+    log.write_text("".join(log.read_text().splitlines(keepends=True)[:-1]))  # It told of no end.
+    said: list[str] = []
+    with PageBesideSession(output, said.append, 18380) as page, SessionLock(output) as lock:
+        while not said:
+            assert page._process.poll() is None
+            time.sleep(0.1)
+        tab = Tab(browser, said[0].removeprefix("live page: "))
+        tab.wait_for(lambda: "running" in tab.text and "/ 6" in tab.text)
+        lock.close()
+        page._process.stdin.close()  # As the system does.
+        tab.wait_for(lambda: "broken off" in tab.text)
+        assert "no process here works on it" in tab.text
+        assert page._process.poll() is None
+        tab.close()
+        assert page._process.wait(60) == 0
