@@ -26,7 +26,7 @@ def test_of_a_session_that_was_stopped_there_is_one_too(tmp_path, capsys):
     assert main(["report", str(output)]) == 0
     assert "report.html" in capsys.readouterr().out
     page = (output / "report.html").read_text(encoding="utf-8")
-    assert "before its end: the same command goes on" in page
+    assert "before its end. The same command goes on." in page
 
 
 @pytest.mark.parametrize("arguments", [[], ["--photos", "nowhere"]])
