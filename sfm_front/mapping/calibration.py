@@ -17,9 +17,10 @@ class CalibrationOptions:
     grow_lens: bool = True
     # Photos that must share the camera.
     min_photos: int = 8
-    # Share of the median reprojection error that each step must take away (TUNING: lens-gain), and
-    # that residuals must promise for it to be tried (TUNING: lens-promise).
+    # Share of the median reprojection error that each step must take away (TUNING: lens-gain).
     min_gain: float = 0.01
+    # Share of that which residuals must promise for a lens to be tried (TUNING: lens-promise).
+    promise_share: float = 0.7
     # Of the long side; a model that wants its principal point farther out is not determined.
     max_shift: float = 0.025
     # Standard deviation of the focal length as a share of it, up to which photos determine their
@@ -29,7 +30,7 @@ class CalibrationOptions:
     def __post_init__(self) -> None:
         if self.min_photos < 1:
             raise ConfigError(f"min_photos must be at least 1, got {self.min_photos}")
-        for name in ("min_gain", "max_shift", "max_focal_sigma"):
+        for name in ("min_gain", "promise_share", "max_shift", "max_focal_sigma"):
             value = getattr(self, name)
             if not 0 <= value < 1:
                 raise ConfigError(f"{name} must be from 0 to below 1, got {value}")

@@ -135,7 +135,7 @@ class Initializer:
             for pair in self._view_graph.pairs(group):
                 if (*pair, number) in self._tried:
                     continue
-                if self._is_too_narrow(pair, level):
+                if self._is_hopeless(pair, level):
                     continue
                 if trials == 0:
                     return None
@@ -156,7 +156,7 @@ class Initializer:
             if level.min_waiting is None:
                 break
             pairs = self._view_graph.pairs(self._view_graph.image_ids)
-            if all(self._is_too_narrow(pair, level) for pair in pairs):
+            if all(self._is_hopeless(pair, level) for pair in pairs):
                 continue  # COLMAP would estimate every one of them to find none.
             finder = Model(self._view_graph, self._mapper_options)
             num_new = 0
@@ -172,11 +172,14 @@ class Initializer:
                 if model is not None:
                     yield model
 
-    def _is_too_narrow(self, pair: tuple[int, int], level: ConstraintLevel) -> bool:
-        """Whether the angle, if known from verification, is far below what the level asks for.
+    def _is_hopeless(self, pair: tuple[int, int], level: ConstraintLevel) -> bool:
+        """Whether a pair has fewer matches than the level asks for inliers, or an angle, if known
+        from verification, that is far below what it asks for.
 
-        It has the error of the focal length in it.
+        The angle has the error of the focal length in it.
         """
+        if self._view_graph.num_matches(pair) < level.constraints.min_inliers:
+            return True
         angle_deg = self._view_graph.angle_deg(pair)
         least_deg = self._options.angle_tolerance * level.constraints.min_angle_deg
         return angle_deg is not None and angle_deg < least_deg

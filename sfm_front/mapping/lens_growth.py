@@ -161,16 +161,19 @@ def _most_promising(
     lenses: Sequence[Lens],
     options: CalibrationOptions,
 ) -> Lens | None:
-    """The lens that promises most beyond what its steps must bring, of those that do."""
+    """The lens that promises most beyond what its steps must bring, of those that do; else the
+    one that promises nearly enough."""
     unexplained = 1 - evidence.explained(Lens(camera.model_name).params)
-    best, most = None, 0.0
+    best, most = None, (False, -math.inf)
     for lens in lenses:
         fall = 1 - (1 - evidence.explained(lens.params)) / unexplained
-        beyond = fall - options.min_gain * _steps(camera, lens)
-        if fall < _asked(camera, lens, options):
+        asked = _asked(camera, lens, options)
+        if fall < options.promise_share * asked:
             continue
-        if beyond > most and evidence.focal_sigma(lens.params) <= options.max_focal_sigma:
-            best, most = lens, beyond
+        beyond = fall - options.min_gain * _steps(camera, lens)
+        rank = (True, beyond) if fall >= asked else (False, fall / asked)
+        if rank > most and evidence.focal_sigma(lens.params) <= options.max_focal_sigma:
+            best, most = lens, rank
     return best
 
 

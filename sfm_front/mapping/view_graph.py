@@ -113,6 +113,10 @@ class ViewGraph:
         ]
         return [(i, j) for _, i, j in sorted(found)]
 
+    def num_matches(self, pair: tuple[int, int]) -> int:
+        """Of a verified pair."""
+        return self._neighbors[pair[0]][pair[1]]
+
     def angle_deg(self, pair: tuple[int, int]) -> float | None:
         """Median triangulation angle of a verified pair, by its own two-view geometry.
 

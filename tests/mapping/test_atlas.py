@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.photo_stream import SceneFeed, position_errors_m, registered_names, true_pair
+from helpers.view_graphs import graph_of, line
 
 from sfm_front.errors import ConfigError
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, make_scene
@@ -24,7 +25,7 @@ from sfm_front.events import (
 from sfm_front.mapping.atlas import Atlas, AtlasOptions
 from sfm_front.mapping.finishing import finish
 from sfm_front.mapping.initialization import InitializationOptions
-from sfm_front.mapping.mapper_options import MapperOptions
+from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
 from sfm_front.mapping.model import Model
 from sfm_front.mapping.view_graph import ViewGraph
 from sfm_front.types import PairGeometry
@@ -284,6 +285,22 @@ def test_a_camera_that_did_not_move_is_not_searched_for_a_start(orbit, monkeypat
     finish(atlas)
     assert atlas.models == []
     assert atlas.waiting == list(range(1, 9))
+
+
+def test_pairs_with_too_few_matches_take_no_trials(monkeypatch):
+    """Along a street there are many such; one that could begin a model must get its turn."""
+    asked: list[int] = []
+
+    def initialize(_: Model, *args: object) -> bool:
+        constraints = args[2]
+        assert isinstance(constraints, InitialPairConstraints)
+        asked.append(constraints.min_inliers)
+        return False
+
+    monkeypatch.setattr(Model, "initialize", initialize)
+    atlas = Atlas(graph_of(10, line(1, 10)), OPTIONS)  # 50 matches each
+    atlas.add(10)
+    assert asked == [50] * InitializationOptions().max_trials
 
 
 def test_the_cost_of_global_refinement_stays_amortised(orbit, monkeypatch):

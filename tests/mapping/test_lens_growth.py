@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Collection
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from sfm_front.errors import ConfigError
 from sfm_front.evaluation.poses import pose_errors
 from sfm_front.mapping.bundle_adjustment import RobustAdjustmentOptions, adjust_robustly
 from sfm_front.mapping.calibration import CalibrationOptions
+from sfm_front.mapping.lens_evidence import LensEvidence, Param
 from sfm_front.mapping.lens_growth import simplify_lenses, with_grown_lenses
 
 OPENCV = (-0.1, 0.02, 0.002, -0.003)
@@ -58,6 +60,18 @@ def test_otherwise_it_stays_simple(lens, distortion, photos, options):
     assert end_of(mapped, **options).camera(1).model_name == "SIMPLE_RADIAL"
 
 
+@pytest.mark.parametrize(("promise", "ends_as"), [(0.016, "OPENCV"), (0.012, "SIMPLE_RADIAL")])
+def test_a_lens_that_promises_nearly_enough_is_tried(promise, ends_as, monkeypatch):
+    """OPENCV is asked for 2 %. What residuals promise is less than what an adjustment brings."""
+
+    def explained(_: LensEvidence, params: Collection[Param]) -> float:
+        return promise if Param.P1 in params and Param.CX not in params else 0.0
+
+    mapped = as_mapped(true_model(camera_of("OPENCV", OPENCV)))
+    monkeypatch.setattr(LensEvidence, "explained", explained)
+    assert end_of(mapped).camera(1).model_name == ends_as
+
+
 def test_it_goes_on_from_the_rung_it_stands_on():
     """As after a session that was resumed, and a camera that was named RADIAL stays so."""
     mapped = as_mapped(true_model(camera_of("OPENCV", OPENCV)), "RADIAL")
@@ -77,6 +91,7 @@ def test_one_of_two_cameras_grows():
     [
         {"min_photos": 0},
         {"min_gain": 1},
+        {"promise_share": 1},
         {"max_shift": -1},
         {"max_focal_sigma": -1},
     ],
