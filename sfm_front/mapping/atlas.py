@@ -252,19 +252,12 @@ class Atlas:
         return not self.grow()
 
     def refine_until_stable(self) -> None:
-        """Grow and refine in turn until nothing more registers; what failed is retried.
-
-        A model that holds all photos is left as it is: nothing is to be gained by refining it.
-        """
+        """Grow and refine in turn until nothing more registers; what failed is retried."""
         self._forget_failures()
-        while self.grow() and not self._is_complete:
+        while self.grow():
             for model in self.models:
                 model.refine()
             self._forget_failures()
-
-    @property
-    def _is_complete(self) -> bool:
-        return len(self.models) == 1 and not self.waiting
 
     def candidates_of(self, model: Model) -> list[int]:
         """Photos that a model may register; for the largest, those of smaller models too."""
