@@ -18,13 +18,14 @@ from sfm_front.mapping.bundle_adjustment import (
 from sfm_front.mapping.calibration import CalibrationOptions, photos_by_camera
 from sfm_front.mapping.lens_evidence import LensEvidence, Param
 
-_FREE = {
+FREE = {
     "SIMPLE_PINHOLE": (Param.FOCAL,),
     "PINHOLE": (Param.FOCAL, Param.ASPECT),
     "SIMPLE_RADIAL": (Param.FOCAL, Param.K1),
     "RADIAL": (Param.FOCAL, Param.K1, Param.K2),
     "OPENCV": (Param.FOCAL, Param.ASPECT, Param.K1, Param.K2, Param.P1, Param.P2),
 }
+"""What is refined of a camera model, its principal point aside; the focal length first."""
 _PRINCIPAL_POINT = (Param.CX, Param.CY)
 
 
@@ -38,7 +39,7 @@ class Lens:
     @property
     def params(self) -> tuple[Param, ...]:
         """What is refined of it."""
-        return _FREE[self.model] + (_PRINCIPAL_POINT if self.moves_principal_point else ())
+        return FREE[self.model] + (_PRINCIPAL_POINT if self.moves_principal_point else ())
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,6 +66,7 @@ class LocalRefinement:
         self._triangulation = pipeline.get_triangulation()
         self._adjustment = pipeline.get_local_bundle_adjustment()
         self._waiting: list[int] = []
+        self.held_cameras: Collection[int] = ()
 
     def add(self, mapper: pycolmap.IncrementalMapper, image_id: int) -> None:
         """Refine around a newly registered and triangulated photo, now or with its batch."""
@@ -98,7 +99,7 @@ class LocalRefinement:
     def _adjust(
         self, mapper: pycolmap.IncrementalMapper, bundle: set[int], points: set[int]
     ) -> None:
-        """Cameras stay fixed if photos outside the bundle share them."""
+        """Cameras stay fixed if they are held, or photos outside the bundle share them."""
         model = mapper.reconstruction
         config = pycolmap.BundleAdjustmentConfig()
         config.fix_gauge(pycolmap.BundleAdjustmentGauge.THREE_POINTS)
@@ -108,7 +109,8 @@ class LocalRefinement:
             camera_id = model.image(image_id).camera_id
             in_bundle[camera_id] = in_bundle.get(camera_id, 0) + 1
         for camera_id, count in in_bundle.items():
-            if count < mapper.num_reg_images_per_camera[camera_id]:
+            is_shared = count < mapper.num_reg_images_per_camera[camera_id]
+            if is_shared or camera_id in self.held_cameras:
                 config.set_constant_cam_intrinsics(camera_id)
         for point_id in points:
             config.add_variable_point(point_id)

@@ -20,6 +20,7 @@ from sfm_front.mapping.calibration import impossible_photos, is_miscalibrated
 from sfm_front.mapping.camera_motion import camera_centers, camera_motion
 from sfm_front.mapping.carry_over import carry_over
 from sfm_front.mapping.final_adjustment import drop_misfits, final_adjustment
+from sfm_front.mapping.held_camera import HeldCamera
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
 from sfm_front.mapping.model_state import ModelState
@@ -65,6 +66,7 @@ class Model:
         self._local = LocalRefinement(self._streaming, options.local_refinement, view_graph.part)
         self._schedule = RefinementSchedule(options.schedule)
         self._next = NextImage(options.retry_growth)
+        self._camera = HeldCamera(options.calibration, is_determined=False)
         self._mapper, self.reconstruction = view_graph.new_mapper(reconstruction)
 
     @classmethod
@@ -88,6 +90,8 @@ class Model:
         model._mapping = copy.deepcopy(model._mapping)
         model._mapping.abs_pose_min_num_inliers = state.min_pose_inliers
         model._schedule.refined(state.refined_images, state.refined_points)
+        model._camera.is_determined = state.is_camera_determined
+        model._hold_camera()
         return model
 
     @property
@@ -101,6 +105,7 @@ class Model:
             min_pose_inliers=self._mapping.abs_pose_min_num_inliers,
             refine_intrinsics=self._options.refine_intrinsics,
             is_georeferenced=self.is_georeferenced,
+            is_camera_determined=self._camera.is_determined,
         )
 
     def succeeded_by(self, reconstruction: pycolmap.Reconstruction) -> Model:
@@ -177,6 +182,7 @@ class Model:
             self._mapper.triangulate_image(self._triangulation, image_id)
         if self.num_points < constraints.min_points:
             return False
+        self._hold_camera()
         adjustment = self._options.final(2).get_global_bundle_adjustment()
         adjustment.refine_focal_length &= constraints.refine_intrinsics
         adjustment.refine_extra_params &= constraints.refine_intrinsics
@@ -343,7 +349,9 @@ class Model:
         elif self._beside.is_free:  # else it stays due
             self._begin_anew()
             self._mapper.complete_and_merge_tracks(self._triangulation)
-            self._beside.begin(self.reconstruction, self._options)
+            refine = self._options.refine_intrinsics and not self._camera.ids
+            options = replace(self._options, refine_intrinsics=refine)
+            self._beside.begin(self.reconstruction, options)
             self._note_refined()
 
     def _take_refined(self) -> None:
@@ -388,6 +396,7 @@ class Model:
 
     def _announce_refined(self, seconds: float, centers: Mapping[int, Float64Array]) -> None:
         """``centers``: where its photos stood before."""
+        self._hold_camera()
         self._local.forget(self._mapper)
         if self.emit is not None:
             self.emit(
@@ -399,6 +408,12 @@ class Model:
                     *camera_motion(centers, camera_centers(self.reconstruction)),
                 )
             )
+
+    def _hold_camera(self) -> None:
+        """While its photos do not determine it."""
+        self._camera.look_at(self.reconstruction, self._view_graph.cameras)
+        self._mapping.constant_cameras = self._camera.ids
+        self._local.held_cameras = self._camera.ids
 
     def _note_refined(self) -> None:
         self._schedule.refined(self.num_registered, self.num_points)

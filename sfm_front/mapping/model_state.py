@@ -19,3 +19,5 @@ class ModelState:
     refine_intrinsics: bool
     # Whether its world is a frame of the earth.
     is_georeferenced: bool = False
+    # Whether its photos have once determined its camera.
+    is_camera_determined: bool = True
