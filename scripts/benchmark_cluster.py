@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,7 +28,7 @@ from sfm_front.session.options import SessionOptions, available_cores
 from sfm_front.storage.json_files import write_json
 
 
-def parse() -> argparse.Namespace:
+def parse(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--photos", type=int, default=2000, metavar="N", help="(default: 2000)")
     parser.add_argument("--points", type=int, default=700, metavar="N", help="per photo (700)")
@@ -44,7 +45,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--threads", type=int, metavar="N", help="(default: all cores)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures")
-    return parser.parse_args()
+    return parser.parse_args(argv)
 
 
 def run(args: argparse.Namespace) -> None:
