@@ -14,9 +14,8 @@ from sfm_front.cli.completion import add_completion
 from sfm_front.cli.logs import add_logging, logging_to
 from sfm_front.cli.signals import INTERRUPTED
 from sfm_front.cli.streams import unfailing_streams
-from sfm_front.cli.terminal import printable
+from sfm_front.cli.terminal import printable_line
 from sfm_front.errors import SfmFrontError
-from sfm_front.reports.words import one_line
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -61,7 +60,7 @@ def _run(arguments: argparse.Namespace) -> int:
         with logging_to(arguments.verbose, arguments.log_file):
             return run(arguments)
     except SfmFrontError as error:
-        print(printable(one_line(f"sfm-front {arguments.command}: {error}")), file=sys.stderr)
+        print(printable_line(f"sfm-front {arguments.command}: {error}"), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import TextIO
 
 from sfm_front.cli.heartbeat import Heartbeat
-from sfm_front.cli.terminal import ERASE, is_terminal, printable
+from sfm_front.cli.terminal import ERASE, is_terminal, printable_line
 from sfm_front.events import (
     ControlPointsRefused,
     Event,
@@ -17,7 +17,7 @@ from sfm_front.events import (
     PhotoAdded,
 )
 from sfm_front.reports.event_words import finishing_words
-from sfm_front.reports.words import clock, counted, one_line
+from sfm_front.reports.words import clock, counted
 from sfm_front.types import Skipped
 
 # Photos without a place for any of them after which one wonders: most models start with three or
@@ -61,7 +61,7 @@ class LiveLine:
 
     def _print(self, text: str) -> None:
         # At once: a heartbeat may write between two calls.
-        self._stream.write(f"{ERASE if self._live else ''}{printable(one_line(text))}\n")
+        self._stream.write(f"{ERASE if self._live else ''}{printable_line(text)}\n")
         self._stream.flush()
 
     def _write(self, text: str) -> None:
@@ -71,7 +71,7 @@ class LiveLine:
             self._print(text)
             return
         width = shutil.get_terminal_size().columns - 1
-        self._stream.write(ERASE + printable(one_line(text))[:width])
+        self._stream.write(ERASE + printable_line(text)[:width])
         self._stream.flush()
 
 
@@ -156,7 +156,7 @@ class ProgressLine(LiveLine):
     def _write(self, text: str, *, is_long: bool = False) -> None:
         super()._write(text)
         if not self._quiet:
-            self._heartbeat.say(printable(one_line(text)), is_long=is_long)
+            self._heartbeat.say(printable_line(text), is_long=is_long)
 
 
 class CountLine(LiveLine):

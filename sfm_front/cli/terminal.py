@@ -6,6 +6,8 @@ import os
 import re
 from typing import TYPE_CHECKING, TextIO
 
+from sfm_front.reports.words import one_line
+
 if TYPE_CHECKING:  # It is read before anything heavy may be loaded.
     from sfm_front.reports.lights import Level
 
@@ -26,6 +28,11 @@ def is_terminal(stream: TextIO) -> bool:
 def printable(text: str) -> str:
     """Text whose control characters, but for ends of lines and tabs, are spelled out."""
     return _HARMFUL.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
+
+
+def printable_line(text: str) -> str:
+    """The same on one line, ends of lines spelled out, too."""
+    return printable(one_line(text))
 
 
 def painted(text: str, level: Level, stream: TextIO) -> str:

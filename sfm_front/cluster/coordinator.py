@@ -17,9 +17,6 @@ from sfm_front.cluster.task_queue import TaskQueue
 from sfm_front.cluster.work import DESCRIBE, GROW, JOIN, MATCH, RunSettings
 from sfm_front.cluster.workbench import extraction_settings
 from sfm_front.cluster.working_folder import WorkingFolder
-from sfm_front.features.extraction import make_extractor
-from sfm_front.photos.reader import PhotoReader
-from sfm_front.runtime.devices import usable_device
 from sfm_front.session.given import GivenSession
 from sfm_front.session.summing_up import SessionResult
 from sfm_front.types import PhotoPath
@@ -61,9 +58,6 @@ class Coordinator:
         self._report = on_progress
         self._folder = WorkingFolder(session.output)
         self._figures = Figures()
-        reader = PhotoReader(max_image_size=session.options.max_image_size)
-        device, _ = usable_device(session.options.device)
-        sift = make_extractor(device, session.options.sift)
         descriptor, weights = session.global_descriptor, session.options.weights
         with self._figures.serial("probe"):
             token, content = self._folder.write_token()
@@ -83,7 +77,7 @@ class Coordinator:
         )
         features = FeatureStore(
             self._folder.features,
-            extraction_settings(reader, sift.fingerprint, descriptor.fingerprint),
+            extraction_settings(session.options, descriptor),
             session.database,
             is_shared=self.is_shared,
             sees_photos=sees_photos,

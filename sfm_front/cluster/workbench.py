@@ -8,12 +8,13 @@ from sfm_front.cluster.work import RunSettings
 from sfm_front.errors import ConfigError, InputError
 from sfm_front.features.extraction import FeatureExtraction, make_extractor
 from sfm_front.features.feature_cache import ExtractionSettings, FeatureCache
-from sfm_front.features.global_descriptors.descriptor import resolve
+from sfm_front.features.global_descriptors.descriptor import GlobalDescriptor, resolve
 from sfm_front.photos.reader import PhotoReader
 from sfm_front.runtime.devices import usable_device
 from sfm_front.runtime.worker_pool import WorkerPool
 from sfm_front.session.catalog import FeatureMemory
 from sfm_front.session.matching_parts import make_matching
+from sfm_front.session.options import SessionOptions
 from sfm_front.types import Features
 
 # Of a worker's features: many workers may share a machine.
@@ -52,7 +53,7 @@ class Workbench:
         reader = PhotoReader(max_image_size=self.options.max_image_size)
         sift = make_extractor(device, self.options.sift)
         self.extraction = FeatureExtraction(reader, sift, descriptor, num_threads=1)
-        self.keys = extraction_settings(reader, sift.fingerprint, descriptor.fingerprint)
+        self.keys = _settings(reader, sift.fingerprint, descriptor)
         self.cache = None if settings.cache is None else FeatureCache(settings.cache)
         self.matching = make_matching(self.options, device, WorkerPool(1))
         self.feature_keys: dict[int, str] = {}
@@ -73,7 +74,17 @@ class Workbench:
         return local.features
 
 
-def extraction_settings(reader: PhotoReader, sift: str, descriptor: str) -> ExtractionSettings:
-    """By which coordinator and workers find features of the same photo. ``sift`` and
-    ``descriptor``: their fingerprints."""
-    return ExtractionSettings(reader.max_image_size, reader.min_image_size, sift, (descriptor,))
+def extraction_settings(
+    options: SessionOptions, descriptor: GlobalDescriptor
+) -> ExtractionSettings:
+    """By which coordinator and workers find features of the same photo."""
+    device, _ = usable_device(options.device)
+    sift = make_extractor(device, options.sift)
+    return _settings(
+        PhotoReader(max_image_size=options.max_image_size), sift.fingerprint, descriptor
+    )
+
+
+def _settings(reader: PhotoReader, sift: str, descriptor: GlobalDescriptor) -> ExtractionSettings:
+    sizes = reader.max_image_size, reader.min_image_size
+    return ExtractionSettings(*sizes, sift, (descriptor.fingerprint,))

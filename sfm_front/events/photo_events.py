@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from sfm_front.events.model_events import ModelEvent
-from sfm_front.types import CandidateOutcome, Skipped, WaitingReason
+from sfm_front.types import CandidateOutcome, Skipped, StoredPhoto, WaitingReason
 
 # Stages of ``PhotoAdded.seconds`` that run ahead of a photo's turn, beside the mapping of others.
 PREFETCHED_STAGES = frozenset({"read", "sift", "vlad", "network"})
@@ -30,6 +30,17 @@ class PhotoAdded:
     num_points: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     events: tuple[ModelEvent, ...] = ()
+
+    @classmethod
+    def restored(cls, photo: StoredPhoto) -> PhotoAdded:
+        """What is known of a photo of an earlier run; what its mapping took is not any more."""
+        return cls(
+            photo.name,
+            photo.image_id,
+            num_keypoints=photo.num_keypoints,
+            candidates=photo.candidates,
+            seconds=photo.seconds,
+        )
 
     @property
     def most_relevant(self) -> str | None:

@@ -127,7 +127,7 @@ class _Verdicts:
     def of(cls, reconstruction: pycolmap.Reconstruction, view_graph: ViewGraph) -> _Verdicts:
         pairs = view_graph.pairs(reconstruction.reg_image_ids())
         found = [
-            (view_graph.neighbors(pair[0])[pair[1]], agrees.mean())
+            (view_graph.num_matches(pair), agrees.mean())
             for pair, _, agrees in agreeing(reconstruction, view_graph, pairs, at_most=_SAMPLE)
         ]
         num_matches, shares = np.array(found, np.float64).reshape(-1, 2).T

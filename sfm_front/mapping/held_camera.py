@@ -25,21 +25,30 @@ class HeldCamera:
         self.is_determined = is_determined
         self.ids: set[int] = set()
 
+    def hold(
+        self, reconstruction: pycolmap.Reconstruction, first: dict[int, pycolmap.Camera]
+    ) -> None:
+        """Unless it is determined. ``first``: cameras as photos came with them, by id."""
+        cameras = {} if self.is_determined else photos_by_camera(reconstruction)
+        self.ids = {
+            camera_id
+            for camera_id in cameras
+            if len(cameras) == 1
+            and first[camera_id].has_prior_focal_length
+            and reconstruction.camera(camera_id).model_name in FREE
+        }
+
     def look_at(
         self, reconstruction: pycolmap.Reconstruction, first: dict[int, pycolmap.Camera]
     ) -> None:
-        """After an adjustment. ``first``: cameras as photos came with them, by id."""
-        photos = photos_by_camera(reconstruction)
-        self.ids = set()
-        if self.is_determined or len(photos) != 1:
+        """The same after an adjustment, by which it may be determined."""
+        self.hold(reconstruction, first)
+        if not self.ids or reconstruction.num_reg_images() < _MIN_PHOTOS:
             return
-        ((camera_id, image_ids),) = photos.items()
-        lens = FREE.get(reconstruction.camera(camera_id).model_name)
-        if lens is None or not first[camera_id].has_prior_focal_length:
+        (camera_id,) = self.ids
+        evidence = LensEvidence.of(reconstruction, camera_id)
+        if evidence is None:
             return
-        if len(image_ids) >= _MIN_PHOTOS:
-            evidence = LensEvidence.of(reconstruction, camera_id)
-            sigma = evidence.focal_sigma(lens) if evidence else float("inf")
-            self.is_determined = sigma <= self._options.max_focal_sigma
-        if not self.is_determined:
-            self.ids = {camera_id}
+        sigma = evidence.focal_sigma(FREE[reconstruction.camera(camera_id).model_name])
+        if sigma <= self._options.max_focal_sigma:
+            self.is_determined, self.ids = True, set()

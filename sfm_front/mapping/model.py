@@ -16,16 +16,17 @@ from sfm_front.mapping.bundle_adjustment import (
     robust_adjustment,
     solved_directly,
 )
-from sfm_front.mapping.calibration import impossible_photos, is_miscalibrated
+from sfm_front.mapping.calibration import is_miscalibrated
 from sfm_front.mapping.camera_motion import camera_centers, camera_motion
 from sfm_front.mapping.carry_over import carry_over
-from sfm_front.mapping.final_adjustment import drop_misfits, final_adjustment
+from sfm_front.mapping.final_adjustment import drop_misfits
+from sfm_front.mapping.finished_model import finished_model
 from sfm_front.mapping.held_camera import HeldCamera
 from sfm_front.mapping.local_refinement import LocalRefinement
 from sfm_front.mapping.mapper_options import InitialPairConstraints, MapperOptions
 from sfm_front.mapping.model_state import ModelState
 from sfm_front.mapping.next_image import NextImage
-from sfm_front.mapping.position_priors import PositionPriors, held_to_positions
+from sfm_front.mapping.position_priors import PositionPriors
 from sfm_front.mapping.refinement_beside import RefinementBeside
 from sfm_front.mapping.refinement_schedule import RefinementSchedule
 from sfm_front.mapping.view_graph import ViewGraph
@@ -50,9 +51,8 @@ class Model:
         # 0 until whoever starts it gives it another.
         self.model_id = 0
         self.is_georeferenced = False
-        # Once it is finished, see ``GrownModel``.
+        # Once it is finished, see ``FinishedModel``.
         self.focal_sigmas: Mapping[int, float] = {}
-        # Whether the last adjustment kept to positions; None if it was not asked to.
         self.is_held_to_positions: bool | None = None
         self._priors: PositionPriors | None = None
         self._finished: pycolmap.ObservationManager | None = None
@@ -66,7 +66,8 @@ class Model:
         self._local = LocalRefinement(self._streaming, options.local_refinement, view_graph.part)
         self._schedule = RefinementSchedule(options.schedule)
         self._next = NextImage(options.retry_growth)
-        self._camera = HeldCamera(options.calibration, is_determined=False)
+        # Where no adjustment moves it, nothing is to be held.
+        self._camera = HeldCamera(options.calibration, is_determined=not options.refine_intrinsics)
         self._mapper, self.reconstruction = view_graph.new_mapper(reconstruction)
 
     @classmethod
@@ -148,10 +149,7 @@ class Model:
 
         ``image_ids``: the photos of these pairs. The model is not refined.
         """
-        self._begin_anew()
-        for image_id in sorted(self.registered.intersection(image_ids)):
-            self._mapper.triangulate_image(self._triangulation, image_id)
-        self.forget_failures()
+        self._triangulate_anew(self.registered.intersection(image_ids))
 
     def take_two_view_tracks(self) -> None:
         """Triangulate points that two photos alone show, too, from now on.
@@ -160,8 +158,11 @@ class Model:
         any others to register a further one by.
         """
         self._triangulation.ignore_two_view_tracks = False
+        self._triangulate_anew(self.registered)
+
+    def _triangulate_anew(self, image_ids: Iterable[int]) -> None:
         self._begin_anew()
-        for image_id in sorted(self.registered):
+        for image_id in sorted(image_ids):
             self._mapper.triangulate_image(self._triangulation, image_id)
         self.forget_failures()
 
@@ -290,21 +291,10 @@ class Model:
             self._mapping, robust_adjustment(self._options.robust, self.num_registered)
         )
         self.reconstruction.update_point_3d_errors()
-        polished = final_adjustment(
-            self.reconstruction, self._options.robust, self._options.calibration
-        )
-        self.reconstruction = polished.reconstruction
-        self.focal_sigmas = polished.focal_sigmas
-        if self._priors is not None and self._priors.are_enough:
-            held = held_to_positions(
-                self.reconstruction, self._priors, self._options.robust, self._options.priors
-            )
-            self.is_held_to_positions = held is not None
-            self.reconstruction = held or self.reconstruction
-        if not self.is_miscalibrated:
-            for image_id in impossible_photos(self.reconstruction, self._mapping):
-                self.reconstruction.deregister_frame(self.reconstruction.image(image_id).frame_id)
-        self._end_as(self.reconstruction)
+        finished = finished_model(self.reconstruction, self._options, self._mapping, self._priors)
+        self.focal_sigmas = finished.focal_sigmas
+        self.is_held_to_positions = finished.is_held_to_positions
+        self._end_as(finished.reconstruction)
 
     def _end_as(self, reconstruction: pycolmap.Reconstruction) -> None:
         """What is asked from here on must be of the model that is handed out."""
@@ -396,7 +386,7 @@ class Model:
 
     def _announce_refined(self, seconds: float, centers: Mapping[int, Float64Array]) -> None:
         """``centers``: where its photos stood before."""
-        self._hold_camera()
+        self._hold_camera(was_adjusted=True)
         self._local.forget(self._mapper)
         if self.emit is not None:
             self.emit(
@@ -409,9 +399,10 @@ class Model:
                 )
             )
 
-    def _hold_camera(self) -> None:
-        """While its photos do not determine it."""
-        self._camera.look_at(self.reconstruction, self._view_graph.cameras)
+    def _hold_camera(self, *, was_adjusted: bool = False) -> None:
+        """Unless its photos determine it, as an adjustment may have shown."""
+        decide = self._camera.look_at if was_adjusted else self._camera.hold
+        decide(self.reconstruction, self._view_graph.cameras)
         self._mapping.constant_cameras = self._camera.ids
         self._local.held_cameras = self._camera.ids
 

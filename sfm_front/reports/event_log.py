@@ -101,7 +101,7 @@ class EventLog(Closeable):
     def in_folder(cls, output: Path) -> EventLog:
         """Append to ``output/events.jsonl``; a line that a killed process left torn is removed."""
         file = output / FILE
-        last_added = _without_torn_line(file)
+        last_added = _last_added(_whole_lines(file)) if file.is_file() else None
         return cls(file.open("a", encoding="utf-8"), last_added)
 
     def lacks(self, image_id: int) -> bool:
@@ -150,18 +150,21 @@ def _plain(value: object) -> object:
     return str(value)
 
 
-def _without_torn_line(file: Path) -> int | None:
-    """Remove what a killed process left of a line; see ``EventLog`` for what is returned."""
-    if not file.is_file():
-        return None
+def _whole_lines(file: Path) -> bytes:
+    """What is in it, once what a killed process left of a line is removed."""
     with file.open("rb+") as content:
         data = content.read()
         whole = data.rfind(b"\n") + 1
         if whole < len(data):
             content.truncate(whole)
+    return data[:whole]
+
+
+def _last_added(lines: bytes) -> int:
+    """Image id of the photo that was acknowledged last; 0 if none was."""
     # Within the values of a line, quotes are escaped.
-    place = data.rfind(b'"event": "photo_added"', 0, whole)
+    place = lines.rfind(b'"event": "photo_added"')
     if place < 0:
         return 0
-    line = data[data.rfind(b"\n", 0, place) + 1 : data.index(b"\n", place)]
+    line = lines[lines.rfind(b"\n", 0, place) + 1 : lines.index(b"\n", place)]
     return int(json.loads(line)["image_id"])

@@ -31,7 +31,7 @@ from sfm_front.reports.run_summary import (
     RunSummary,
     Totals,
 )
-from sfm_front.types import ModelSummary, Skipped, StoredPhoto, Waiting
+from sfm_front.types import ModelSummary, Skipped, Waiting
 
 
 class RunReport:
@@ -52,18 +52,10 @@ class RunReport:
             self._skipped[photo.name] = photo
         self._photos.append(photo)
 
-    def restore(self, photo: StoredPhoto) -> None:
-        """Note a photo of an earlier run; what its mapping took is not known any more."""
+    def restore(self, photo: PhotoAdded) -> None:
+        """Note a photo of an earlier run."""
         self._restored.add(photo.image_id)
-        self._photos.append(
-            PhotoAdded(
-                photo.name,
-                photo.image_id,
-                num_keypoints=photo.num_keypoints,
-                candidates=photo.candidates,
-                seconds=photo.seconds,
-            )
-        )
+        self._photos.append(photo)
 
     def finish(
         self,

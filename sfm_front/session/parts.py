@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sfm_front.events import PhotoAdded
@@ -34,7 +33,6 @@ from sfm_front.session.photo_positions import PhotoPositions
 from sfm_front.session.second_look import SecondLook
 from sfm_front.session.snapshots import Snapshot
 from sfm_front.storage.database import DATABASE, PhotoDatabase
-from sfm_front.types import StoredPhoto
 
 
 @dataclass(frozen=True)
@@ -146,7 +144,8 @@ def restore(
         parts.positions.take(image_id, photo.name, photo.exif)
         parts.control_points.take(photo.name, (photo.width, photo.height))
         parts.retriever.remember(image_id, photo.global_vector)
-        parts.report.restore(photo)
+        added = PhotoAdded.restored(photo)
+        parts.report.restore(added)
         pairs = database.pairs(image_id)
         parts.view_graph.add(image_id, photo.name, camera, keypoints, pairs)
         parts.second_look.note(image_id, (pair.image_id2 for pair in pairs))
@@ -161,23 +160,15 @@ def restore(
             placed = atlas.add(image_id)
             parts.georeferencing.follow(atlas.models)
         if log.lacks(image_id):
-            log.write(_added(parts, photo, placed or ()))
+            log.write(
+                replace(
+                    added,
+                    registered=tuple(map(parts.catalog.name, placed or ())),
+                    num_registered=len(atlas.registered),
+                    num_points=atlas.num_points,
+                )
+            )
         if placed is not None:
             announcer.tell_outcome(atlas, image_id, placed)
     # Of earlier photos, whose reports are written.
     announcer.pop_model_events()
-
-
-def _added(parts: SessionParts, photo: StoredPhoto, placed: Sequence[int]) -> PhotoAdded:
-    """What its own process would have told of a photo, as far as it is known here."""
-    return PhotoAdded(
-        name=photo.name,
-        image_id=photo.image_id,
-        num_keypoints=photo.num_keypoints,
-        candidates=photo.candidates,
-        registered=tuple(map(parts.catalog.name, placed)),
-        num_registered=len(parts.atlas.registered),
-        num_points=parts.atlas.num_points,
-        seconds=photo.seconds,
-        events=(),
-    )

@@ -22,11 +22,9 @@ from sfm_front.evaluation.gps import gps_residual_m
 from sfm_front.evaluation.poses import auc, pose_errors
 from sfm_front.evaluation.synthetic.positions import measured_positions
 from sfm_front.evaluation.synthetic.scene import SyntheticScene, as_described
-from sfm_front.features.extraction import make_extractor
-from sfm_front.features.feature_cache import CachedFeatures
+from sfm_front.features.feature_cache import CachedFeatures, FeatureCache
 from sfm_front.features.global_descriptors.descriptor import resolve
-from sfm_front.photos.reader import PhotoReader, file_digest
-from sfm_front.runtime.devices import usable_device
+from sfm_front.photos.reader import file_digest
 from sfm_front.session.given import GivenSession
 from sfm_front.session.options import SessionOptions
 from sfm_front.session.session import Session
@@ -84,7 +82,7 @@ class Flight:
         """On workers, which read the photos' files in ``folder``: they are made here, with nothing
         in them but their names."""
         with GivenSession(output, self._options) as session:
-            files = [self._laid_out(photo, output, folder) for photo in self._photos]
+            files = self._laid_out(WorkingFolder(output).features, folder)
 
             def tell(now: ClusterProgress) -> None:
                 note(f"{now.num_matched} matched, {now.num_grown} of {now.num_groups} groups grown")
@@ -96,21 +94,19 @@ class Flight:
                 seconds = perf_counter() - started
         return self._judged(result, seconds)
 
-    def _laid_out(self, photo: ExtractedPhoto, output: Path, folder: Path) -> PhotoPath:
-        """A file that workers take for the photo, whose features they find."""
-        path = folder / photo.name
-        path.write_bytes(photo.name.encode())
-        digest = file_digest(path, photo.name)
-        assert isinstance(digest, str)
-        device, _ = usable_device(self._options.device)
-        sift = make_extractor(device, self._options.sift)
-        reader = PhotoReader(max_image_size=self._options.max_image_size)
-        settings = extraction_settings(reader, sift.fingerprint, self._descriptor.fingerprint)
-        keys, cache = settings.keys(digest), WorkingFolder(output).features
-        cache.save_vector(keys.vectors[0], photo.global_vector)
-        local = CachedFeatures(photo.width, photo.height, photo.exif, photo.features)
-        cache.save_local(keys.features, local)
-        return PhotoPath(photo.name, path)
+    def _laid_out(self, cache: FeatureCache, folder: Path) -> list[PhotoPath]:
+        """Files that workers take for the photos, whose features they find."""
+        settings = extraction_settings(self._options, self._descriptor)
+        files = [PhotoPath(photo.name, folder / photo.name) for photo in self._photos]
+        for photo, file in zip(self._photos, files, strict=True):
+            file.path.write_bytes(photo.name.encode())
+            digest = file_digest(file.path, file.name)
+            assert isinstance(digest, str)
+            keys = settings.keys(digest)
+            cache.save_vector(keys.vectors[0], photo.global_vector)
+            local = CachedFeatures(photo.width, photo.height, photo.exif, photo.features)
+            cache.save_local(keys.features, local)
+        return files
 
     def _judged(self, result: SessionResult, seconds: float) -> FlightResult:
         models = [model.reconstruction for model in result.models]
