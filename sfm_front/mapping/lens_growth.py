@@ -27,6 +27,9 @@ FREE = {
 }
 """What is refined of a camera model, its principal point aside; the focal length first."""
 _PRINCIPAL_POINT = (Param.CX, Param.CY)
+# What a principal point must bring even alone, in steps: turned photos make up for a wrong one, and
+# a few wrong matches move it (TUNING: lens-gain).
+_PRINCIPAL_POINT_STEPS = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,10 +205,9 @@ def _steps(camera: pycolmap.Camera, lens: Lens) -> int:
 
 
 def _asked(camera: pycolmap.Camera, lens: Lens, options: CalibrationOptions) -> float:
-    """By what share the median error must fall. A principal point must bring as much as two steps
-    even alone: turned photos make up for a wrong one, and a few wrong matches move it
-    (TUNING: lens-gain)."""
-    return options.min_gain * max(_steps(camera, lens), 2 * lens.moves_principal_point)
+    """By what share the median error must fall."""
+    least = _PRINCIPAL_POINT_STEPS if lens.moves_principal_point else 0
+    return options.min_gain * max(_steps(camera, lens), least)
 
 
 def _is_borne_out(
