@@ -1,4 +1,4 @@
-"""What a browser tells that viser has no messages for: a click on a row, dark or light.
+"""What a browser tells that viser has no messages for: clicks on rows, dark or light, how it draws.
 
 viser's markup cannot call back. A number that nobody sees can: at a click, a browser writes to it.
 Rows say which photo they are of by a number, never by its name.
@@ -12,7 +12,9 @@ import viser
 
 from sfm_front.reports.html.markup import Html, tag
 
-_NOTHING, _DARK, _LIGHT = -1, -2, -3
+_NOTHING = -1
+# Whether a browser prefers dark, and whether it has a graphics card to draw with.
+_MANNERS = {-2: (True, True), -3: (False, True), -4: (True, False), -5: (False, False)}
 _PLACE = "sfm-front-signal"
 # React hears of a value only if it is set as if typed.
 _SIGNAL = (
@@ -25,7 +27,14 @@ _SIGNAL = (
 _ON_CLICK = f"const signal = event.target.closest('[data-photo]')?.dataset.photo; {_SIGNAL}"
 _ON_LOAD = (
     "const dark = matchMedia('(prefers-color-scheme: dark)');"
-    f"const tell = () => {{ const signal = dark.matches ? {_DARK} : {_LIGHT}; {_SIGNAL} }};"
+    "const gl = document.createElement('canvas').getContext('webgl');"
+    "const card = gl?.getExtension('WEBGL_debug_renderer_info');"
+    "const name = card ? gl.getParameter(card.UNMASKED_RENDERER_WEBGL) : '';"
+    # That of Windows is called Microsoft Basic Render Driver.
+    "const slow = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);"
+    "gl?.getExtension('WEBGL_lose_context')?.loseContext();"
+    "const tell = () => {"
+    f" const signal = -2 - (dark.matches ? 0 : 1) - (slow ? 2 : 0); {_SIGNAL} }};"
     # The field may still be on its way into the page.
     "setTimeout(tell, 0); dark.addEventListener('change', tell);"
 )
@@ -49,11 +58,12 @@ class BrowserSignals:
         self,
         client: viser.ClientHandle,
         on_photo: Callable[[int], None],
-        on_theme: Callable[[bool], None],
+        on_manner: Callable[[bool, bool], None],
     ) -> None:
-        """``on_photo`` is called with the number of a photo whose row was clicked, ``on_theme``
-        with whether the browser prefers dark: at first, and whenever that changes."""
-        self._on_photo, self._on_theme = on_photo, on_theme
+        """``on_photo`` is called with the number of a photo whose row was clicked, ``on_manner``
+        with whether the browser prefers dark, and whether it draws with a graphics card: at first,
+        and whenever that changes."""
+        self._on_photo, self._on_manner = on_photo, on_manner
         self._field = client.gui.add_number("", _NOTHING, step=1)
         self._field.on_update(lambda _: self._hear(int(self._field.value)))
         client.gui.add_html(str(_hidden(self._field._impl.uuid)))
@@ -63,8 +73,8 @@ class BrowserSignals:
             return
         # That the same row can be clicked again.
         self._field.value = _NOTHING
-        if signal in (_DARK, _LIGHT):
-            self._on_theme(signal == _DARK)
+        if signal in _MANNERS:
+            self._on_manner(*_MANNERS[signal])
         elif signal >= 0:
             self._on_photo(signal)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -30,6 +31,9 @@ _TICK_S = 0.25
 # Of the time, at most this share goes into showing what is new; and it is shown at most so often.
 _MOST_SHARE = 0.25
 _SHOWN_EVERY_S = 1.0
+# A change makes a browser draw for half a second. Without a graphics card that takes from a session
+# on the same machine, so there the scene changes no more often than this.
+_DRAWN_SLOWLY_EVERY_S = 5.0
 
 
 class LivePage(Closeable):
@@ -46,6 +50,11 @@ class LivePage(Closeable):
         self._views: dict[int, BrowserView] = {}
         self._photo_panels: dict[int, PhotoPanel] = {}
         self._next_s = 0.0
+        # Ids of browsers without a graphics card.
+        self._slow: set[int] = set()
+        # What the scene shows, and since when.
+        self._drawn: Scenery | None = None
+        self._drawn_s = -math.inf
         with redirect_stdout(io.StringIO()):  # It greets.
             self._server = viser.ViserServer(HOST, port, label=_title(output), verbose=False)
         keep_private(self._server)
@@ -88,13 +97,17 @@ class LivePage(Closeable):
                 self._state = seen, self._maker.make(seen)
             if self._state is None:
                 return
-            if seen is not None or self._is_stale.is_set():
-                self._is_stale.clear()
-                self._show(*self._state)
+            if seen is not None:
+                self._tell(*self._state)
             else:
                 self._panel.show_time(self._state[0])
+            is_due = now >= self._drawn_s + (_DRAWN_SLOWLY_EVERY_S if self._slow else 0.0)
+            if self._is_stale.is_set() or (is_due and self._drawn is not self._state[1]):
+                self._is_stale.clear()
+                self._draw(self._state[1])
             for view in self._views.values():
-                view.follow(self._state[1])
+                if self._drawn is not None:
+                    view.follow(self._drawn)
         spent = time.monotonic() - now
         self._next_s = now + max(_SHOWN_EVERY_S, spent / _MOST_SHARE)
 
@@ -103,13 +116,18 @@ class LivePage(Closeable):
         with redirect_stdout(io.StringIO()):  # It says goodbye.
             self._server.stop()
 
-    def _show(self, seen: Seen, scenery: Scenery) -> None:
+    def _tell(self, seen: Seen, scenery: Scenery) -> None:
+        """In words and pictures, beside the scene."""
         with self._server.atomic():
-            self._drawing.show(scenery)
             self._panel.show(seen)
-        set_first_view(self._server, scenery)
         for panel in list(self._photo_panels.values()):
             panel.show(seen, scenery)
+
+    def _draw(self, scenery: Scenery) -> None:
+        self._drawn, self._drawn_s = scenery, time.monotonic()
+        with self._server.atomic():
+            self._drawing.show(scenery)
+        set_first_view(self._server, scenery)
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         panel = PhotoPanel(client, self._pictures)
@@ -117,7 +135,7 @@ class LivePage(Closeable):
         BrowserSignals(
             client,
             on_photo=lambda number: self._open_numbered(client.client_id, number),
-            on_theme=lambda dark: set_theme(client.gui, dark=dark),
+            on_manner=lambda dark, has_card: self._suit(client, dark=dark, has_card=has_card),
         )
         with self._lock:
             self._views[client.client_id] = view
@@ -126,8 +144,15 @@ class LivePage(Closeable):
                 panel.show(*self._state)
                 view.follow(self._state[1])
 
+    def _suit(self, client: viser.ClientHandle, *, dark: bool, has_card: bool) -> None:
+        set_theme(client.gui, dark=dark)
+        with self._lock:
+            if not has_card and client.client_id in self._views:
+                self._slow.add(client.client_id)
+
     def _see_off(self, client: viser.ClientHandle) -> None:
         with self._lock:
+            self._slow.discard(client.client_id)
             self._views.pop(client.client_id, None)
             self._photo_panels.pop(client.client_id, None)
 

@@ -230,6 +230,36 @@ def test_a_session_is_followed_while_it_runs(browser, tmp_path, monkeypatch):
     served.close()
 
 
+def test_without_a_graphics_card_the_scene_waits_and_the_words_do_not(
+    browser, tmp_path, monkeypatch
+):
+    from sfm_front.live_page import server
+
+    monkeypatch.setattr(snapshots, "_MAX_SHARE", math.inf)
+    photos = list(photos_of(orbit(16), tmp_path / "photos"))
+    served = Served(tmp_path / "out")
+    tab = Tab(browser, served.page.address)
+
+    def num_drawn() -> int:
+        return 0 if served.page._drawn is None else len(served.page._drawn.cameras.names)
+
+    tab.wait_for(lambda: len(served.page._slow) == 1)
+    with Session(tmp_path / "out", options(snapshot_seconds=1e-9)) as session:
+        for photo in photos[:10]:
+            session.add_extracted(photo)
+        tab.wait_for(lambda: "/ 10" in tab.text and num_drawn() == 10)
+        monkeypatch.setattr(server, "_DRAWN_SLOWLY_EVERY_S", 1e9)
+        for photo in photos[10:]:
+            session.add_extracted(photo)
+        tab.wait_for(lambda: "/ 16" in tab.text)
+        session.finish()
+    assert num_drawn() == 10
+    monkeypatch.setattr(server, "_DRAWN_SLOWLY_EVERY_S", 1.0)
+    tab.wait_for(lambda: num_drawn() == 16)
+    tab.close()
+    served.close()
+
+
 def test_whoever_looks_reads_that_a_session_was_killed(browser, tmp_path):
     output = tmp_path / "out"
     run_session(output, photos_of(orbit(6), tmp_path / "photos"), finish=False)
