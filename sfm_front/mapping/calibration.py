@@ -20,7 +20,7 @@ class CalibrationOptions:
     # Share of the median reprojection error that each step must take away (TUNING: lens-gain).
     min_gain: float = 0.01
     # Share of that which residuals must promise for a lens to be tried (TUNING: lens-promise).
-    promise_share: float = 0.7
+    promise_share: float = 0.65
     # Of the long side; a model that wants its principal point farther out is not determined.
     max_shift: float = 0.025
     # Standard deviation of the focal length as a share of it, up to which photos determine their

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sfm_front.errors import ConfigError
-from sfm_front.mapping.thinned_adjustment import HUGE
 
 # Photos from which a model is refined globally less often, and its last adjustments converge
 # longer: long flights unbend slowly, small models gain nothing (TUNING: large-growth).
@@ -26,13 +25,9 @@ class ScheduleOptions:
     large_growth: float = 1.6
     # Photos from which a model counts as large.
     large_from: int = LARGE
-    # The same of a huge one: what an adjustment takes grows faster than the model
-    # (TUNING: huge-growth).
-    huge_growth: float = 2.0
-    huge_from: int = HUGE
 
     def __post_init__(self) -> None:
-        for name in ("growth", "large_growth", "huge_growth"):
+        for name in ("growth", "large_growth"):
             value = getattr(self, name)
             if value <= 1:
                 raise ConfigError(f"{name} must be above 1, got {value}")
@@ -52,19 +47,11 @@ class RefinementSchedule:
         return self._num_images, self._num_points
 
     def is_due(self, num_images: int, num_points: int) -> bool:
-        growth = self._growth
+        late = self._num_images >= self._options.large_from
+        growth = self._options.large_growth if late else self._options.growth
         return num_images >= growth * self._num_images or num_points >= growth * self._num_points
 
     def refined(self, num_images: int, num_points: int) -> None:
         """Note that the whole model has just been refined at this size."""
         self._num_images = num_images
         self._num_points = num_points
-
-    @property
-    def _growth(self) -> float:
-        """By what factor a model of the size at the last refinement may grow."""
-        if self._num_images >= self._options.huge_from:
-            return self._options.huge_growth
-        if self._num_images >= self._options.large_from:
-            return self._options.large_growth
-        return self._options.growth

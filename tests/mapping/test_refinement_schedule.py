@@ -18,14 +18,10 @@ def refinements(
     *,
     growth: float,
     large_growth: float | None = None,
-    huge_growth: float | None = None,
     points_per_image: int = 200,
 ) -> list[int]:
     """The sizes at which a model that grows photo by photo is refined, from 2 photos on."""
-    large_growth = large_growth or growth
-    options = ScheduleOptions(
-        growth=growth, large_growth=large_growth, huge_growth=huge_growth or large_growth
-    )
+    options = ScheduleOptions(growth=growth, large_growth=large_growth or growth)
     schedule = RefinementSchedule(options)
     schedule.refined(2, 2 * points_per_image)
     sizes = []
@@ -68,13 +64,6 @@ def test_a_large_model_may_grow_further():
     assert {1.6 <= growth < 1.61 for size, growth in growths if size >= 100} == {True}
 
 
-def test_a_huge_model_may_double():
-    sizes = refinements(9000, growth=1.25, large_growth=1.6, huge_growth=2.0)
-    growths = [(earlier, later / earlier) for earlier, later in pairwise(sizes)]
-    assert {1.6 <= growth < 1.61 for size, growth in growths if 100 <= size < 1000} == {True}
-    assert [growth for size, growth in growths if size >= 1000] == [2.0, 2.0]
-
-
 def test_growth_in_points_alone_is_enough():
     schedule = RefinementSchedule(ScheduleOptions(growth=1.5))
     schedule.refined(90, 1000)
@@ -83,7 +72,7 @@ def test_growth_in_points_alone_is_enough():
     assert schedule.is_due(135, 1001)
 
 
-@pytest.mark.parametrize("name", ["growth", "large_growth", "huge_growth"])
+@pytest.mark.parametrize("name", ["growth", "large_growth"])
 def test_without_growth_there_is_no_schedule(name):
     with pytest.raises(ConfigError, match=f"{name} must be above 1, got 1"):
         ScheduleOptions(**{name: 1.0})
