@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -46,15 +45,15 @@ class LivePage(Closeable):
         self._maker = SceneMaker()
         self._lock = Lock()
         self._is_stale = Event()
+        # The newest, and what is shown of it: a scene may be some seconds behind its words.
+        self._newest: tuple[Seen, Scenery] | None = None
         self._state: tuple[Seen, Scenery] | None = None
+        self._drawn_s = 0.0
         self._views: dict[int, BrowserView] = {}
         self._photo_panels: dict[int, PhotoPanel] = {}
         self._next_s = 0.0
         # Ids of browsers without a graphics card.
         self._slow: set[int] = set()
-        # What the scene shows, and since when.
-        self._drawn: Scenery | None = None
-        self._drawn_s = -math.inf
         with redirect_stdout(io.StringIO()):  # It greets.
             self._server = viser.ViserServer(HOST, port, label=_title(output), verbose=False)
         keep_private(self._server)
@@ -94,20 +93,24 @@ class LivePage(Closeable):
         seen = self._follower.look()
         with self._lock:
             if seen is not None:
-                self._state = seen, self._maker.make(seen)
-            if self._state is None:
+                self._newest = seen, self._maker.make(seen)
+            if self._newest is None:
                 return
-            if seen is not None:
+            newest, scenery = self._newest
+            drawn = None if self._state is None else self._state[1]
+            is_due = now >= self._drawn_s + (_DRAWN_SLOWLY_EVERY_S if self._slow else 0.0)
+            is_new = seen is not None
+            if drawn is None or self._is_stale.is_set() or (is_due and drawn is not scenery):
+                self._is_stale.clear()
+                self._draw(scenery)
+                drawn, is_new = scenery, True
+            self._state = newest, drawn
+            if is_new:
                 self._tell(*self._state)
             else:
-                self._panel.show_time(self._state[0])
-            is_due = now >= self._drawn_s + (_DRAWN_SLOWLY_EVERY_S if self._slow else 0.0)
-            if self._is_stale.is_set() or (is_due and self._drawn is not self._state[1]):
-                self._is_stale.clear()
-                self._draw(self._state[1])
+                self._panel.show_time(newest)
             for view in self._views.values():
-                if self._drawn is not None:
-                    view.follow(self._drawn)
+                view.follow(drawn)
         spent = time.monotonic() - now
         self._next_s = now + max(_SHOWN_EVERY_S, spent / _MOST_SHARE)
 
@@ -124,7 +127,7 @@ class LivePage(Closeable):
             panel.show(seen, scenery)
 
     def _draw(self, scenery: Scenery) -> None:
-        self._drawn, self._drawn_s = scenery, time.monotonic()
+        self._drawn_s = time.monotonic()
         with self._server.atomic():
             self._drawing.show(scenery)
         set_first_view(self._server, scenery)

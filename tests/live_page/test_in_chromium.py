@@ -241,7 +241,8 @@ def test_without_a_graphics_card_the_scene_waits_and_the_words_do_not(
     tab = Tab(browser, served.page.address)
 
     def num_drawn() -> int:
-        return 0 if served.page._drawn is None else len(served.page._drawn.cameras.names)
+        state = served.page._state
+        return 0 if state is None else len(state[1].cameras.names)
 
     tab.wait_for(lambda: len(served.page._slow) == 1)
     with Session(tmp_path / "out", options(snapshot_seconds=1e-9)) as session:
