@@ -4,7 +4,6 @@ behind it."""
 from __future__ import annotations
 
 import subprocess
-import time
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
@@ -45,13 +44,12 @@ class FilesBesideSession(Closeable):
             written = self._models_written()
             if written == self._shown:
                 continue
-            self._shown, began_s = written, time.monotonic()
+            self._shown = written
             spent_s = 0.0
             # Without processes to be had, they come at the end.
             with suppress(OSError):
                 spent_s = self._write()
-            wanted_s = max(self._every_s, spent_s / _MAX_SHARE)
-            pause_s = max(_TICK_S, wanted_s - (time.monotonic() - began_s))
+            pause_s = max(self._every_s, spent_s / _MAX_SHARE)
 
     def _models_written(self) -> int | None:
         """When; None before the first time."""
